@@ -1,0 +1,24 @@
+"""The mathematics: contacts, the wrench problem, its solvers, laws and references. Knows nothing of MuJoCo."""
+
+from pivoting.controller.contacts import Contact
+from pivoting.controller.controller import WrenchController
+from pivoting.controller.laws import Body, Law
+from pivoting.controller.problem import WrenchProblem, wrench_weight
+from pivoting.controller.references import Reference
+from pivoting.controller.solvers import Solution, SolveError, methods, solve
+from pivoting.controller.space import Motion
+
+__all__ = [
+    "Body",
+    "Contact",
+    "Law",
+    "Motion",
+    "Reference",
+    "Solution",
+    "SolveError",
+    "WrenchController",
+    "WrenchProblem",
+    "methods",
+    "solve",
+    "wrench_weight",
+]

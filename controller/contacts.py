@@ -1,0 +1,77 @@
+"""Contacts and the contact Jacobian."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from pivoting.controller.space import cross
+from pivoting.controller.validate import Array, array, fail, number
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """A point of the object that sticks to its support, with the friction it may use.
+
+    Attributes:
+        point: (d,) from the centre of mass to the contact, object axes [m]; d = 2 (x, z) or 3.
+        mu: friction coefficient, > 0.
+        f_min: floor of the normal force [N], >= 0 (a truncated cone).
+        frame: (d, d) contact axes as columns, tangent(s) first and the normal (into the object) last, in world axes;
+            None means the table's own frame.
+    """
+
+    point: Array
+    mu: float
+    f_min: float = 0.0
+    frame: Array | None = None
+
+    def __init__(self, point: ArrayLike, mu: float, f_min: float = 0.0, frame: ArrayLike | None = None):
+        where = array("point", point, (None,))
+        if where.size not in (2, 3):
+            raise fail("point", where, "of length 2 (x, z) or 3 (x, y, z)")
+        object.__setattr__(self, "point", where)
+        object.__setattr__(self, "mu", number("mu", mu, above=0.0))
+        object.__setattr__(self, "f_min", number("f_min", f_min, at_least=0.0, unit="N"))
+        if frame is not None:
+            axes = array("frame", frame, (where.size, where.size))
+            if np.abs(axes.T @ axes - np.eye(where.size)).max() > 1e-6:
+                raise fail("frame", axes, "orthonormal columns")
+            object.__setattr__(self, "frame", axes)
+        else:
+            object.__setattr__(self, "frame", None)
+
+    @property
+    def dim(self) -> int:
+        """2 in the plane, 3 in space."""
+        return int(self.point.size)
+
+
+@njit(cache=True)
+def fill_jacobian(R, points, frames, wrench_map, force_map, J):  # type: ignore[no-untyped-def]
+    """Write the contact Jacobian into J (nw, K d): contact forces, in contact axes, to the wrench in object axes.
+
+    J_c = [I; r^] R(theta) with r^ f = r x f, which in the plane is r^ = [-r_y, r_x] (erratum 3 of the notes).
+
+    Args:
+        R: (3, 3) object to world.
+        points: (K, 3) contacts from the CoM, object axes [m].
+        frames: (K, 3, 3) contact axes as columns (t, o, n), world axes.
+        wrench_map, force_map: (nw, 6) and (3, d), see `Space`.
+    """
+    dim = force_map.shape[1]
+    for i in range(points.shape[0]):
+        for j in range(dim):
+            a0 = a1 = a2 = 0.0
+            for axis in range(3):  # axis j of the contact frame, in object axes: R^T frame
+                pick = force_map[axis, j]
+                for p in range(3):
+                    u = pick * frames[i, p, axis]
+                    a0 += R[p, 0] * u
+                    a1 += R[p, 1] * u
+                    a2 += R[p, 2] * u
+            m0, m1, m2 = cross(points[i, 0], points[i, 1], points[i, 2], a0, a1, a2)
+            for row in range(wrench_map.shape[0]):
+                P = wrench_map[row]
+                J[row, dim * i + j] = P[0] * a0 + P[1] * a1 + P[2] * a2 + P[3] * m0 + P[4] * m1 + P[5] * m2

@@ -1,0 +1,213 @@
+"""The controller: a belief about object, contacts and gravity, a law, and weights; it states and solves the problem.
+
+The same compiled functions serve `problem` (one state, for people) and `step_worlds` (the loop, many worlds).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from pivoting.controller.certificate import kkt_residual
+from pivoting.controller.closed_form import balancing_wrench, planar_force, reduce
+from pivoting.controller.contacts import Contact, fill_jacobian
+from pivoting.controller.laws import Body, Law, fill_required
+from pivoting.controller.problem import WrenchProblem, wrench_weight
+from pivoting.controller.space import IDENTITY, Motion, Space, fill_rotation, rotation_matrix, space
+from pivoting.controller.validate import Array, array, fail, number, positive_definite
+
+SOLVED, INACCURATE, FAILED = 0, 1, 2  # codes of `solvers.STATUS`
+
+
+class Belief(NamedTuple):
+    """What the compiled loop needs to know, as arrays; see `fill_jacobian` and `fill_required` for their meaning."""
+
+    points: Array
+    frames: Array
+    pivot: Array
+    mu: Array
+    f_min: Array
+    mass: float
+    inertia: Array
+    gravity: Array
+    law: tuple[float, float, float, float]
+    Q_w: Array
+    Q_f: Array
+    wrench_map: Array
+    force_map: Array
+
+
+@dataclass(frozen=True, eq=False)
+class WrenchController:
+    """At each state, the problem whose answer is the smallest wrench that moves the object as the law wants.
+
+    Attributes:
+        body: mass and inertia as believed.
+        contacts: the contacts that are to stick, all planar or all spatial.
+        law: static, quasi-dynamic or dynamic.
+        gravity: (d,) in world axes [m/s^2]; in the plane (x, z), or (3,) for a plane that is not x-z.
+        base: (4,) quaternion of the table in the world, for planar contacts on a tilted table; theta is measured from it.
+        margin: share of mu kept unused.
+        Q_w, Q_f: weights in object axes; Q_w defaults to a characteristic length of |pivot| (see `wrench_weight`).
+    """
+
+    body: Body
+    contacts: tuple[Contact, ...]
+    law: Law
+    gravity: Array
+    base: Array
+    margin: float
+    Q_w: Array
+    Q_f: Array
+
+    def __init__(
+        self,
+        body: Body,
+        contacts: Sequence[Contact],
+        law: Law,
+        gravity: ArrayLike,
+        *,
+        base: ArrayLike = IDENTITY,
+        margin: float = 0.0,
+        Q_w: ArrayLike | None = None,
+        Q_f: ArrayLike | None = None,
+    ):
+        held = tuple(contacts)
+        if not held or len({contact.dim for contact in held}) != 1:
+            raise fail("contacts", held, "at least one contact, all planar or all spatial")
+        dim, n = held[0].dim, len(held) * held[0].dim
+        reach = float(np.linalg.norm(np.mean([contact.point for contact in held], axis=0)))
+        if Q_w is None and reach == 0.0:
+            raise fail("contacts", held, "away from the centre of mass, or Q_w given")
+        put = object.__setattr__
+        put(self, "body", body)
+        put(self, "contacts", held)
+        put(self, "law", law)
+        put(self, "gravity", array("gravity", gravity, (3,) if np.size(gravity) == 3 else (dim,)))
+        put(self, "base", array("base", base, (4,)))
+        put(self, "margin", number("margin", margin, at_least=0.0, below=1.0))
+        weight = wrench_weight(dim, reach) if Q_w is None else Q_w
+        put(self, "Q_w", positive_definite("Q_w", weight, 3 * dim - 3))
+        put(self, "Q_f", positive_definite("Q_f", np.eye(n) if Q_f is None else Q_f, n))
+
+    @cached_property
+    def space(self) -> Space:
+        """The plane on this table, or space."""
+        return space(self.contacts[0].dim, self.base)
+
+    @cached_property
+    def belief(self) -> Belief:
+        """The arrays of the compiled loop."""
+        here = self.space
+        table = rotation_matrix(here.base)
+        points = np.array([here.lift(contact.point) for contact in self.contacts])
+        frames = [_lifted_frame(contact, here, table) for contact in self.contacts]
+        return Belief(
+            points=points,
+            frames=np.array(frames),
+            pivot=points.mean(axis=0),
+            mu=np.array([(1.0 - self.margin) * contact.mu for contact in self.contacts]),
+            f_min=np.array([contact.f_min for contact in self.contacts]),
+            mass=float(self.body.mass),
+            inertia=here.lift_inertia(self.body.inertia),
+            gravity=self.gravity if self.gravity.size == 3 else here.lift(self.gravity),
+            law=self.law.coefficients,
+            Q_w=np.array(self.Q_w),
+            Q_f=np.array(self.Q_f),
+            wrench_map=here.wrench_map,
+            force_map=np.ascontiguousarray(here.force_map),
+        )
+
+    def problem(self, state: Motion, desired: Motion | None = None) -> WrenchProblem:
+        """The wrench problem, in object axes, at `state` (its acceleration is not used) with the reference at `desired`.
+
+        With `desired` left out the object is to stay where it is.
+        """
+        belief = self.belief
+        q, omega, _ = self.space.lift_motion(state)
+        target = Motion(state.orientation) if desired is None else desired
+        q_d, omega_d, alpha_d = self.space.lift_motion(target)
+        R, J, required = np.empty((3, 3)), np.empty((len(self.Q_w), len(self.Q_f))), np.empty(len(self.Q_w))
+        _fill_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, required)
+        return WrenchProblem(
+            J,
+            required,
+            [contact.mu for contact in self.contacts],
+            f_min=belief.f_min,
+            margin=self.margin,
+            Q_w=self.Q_w,
+            Q_f=self.Q_f,
+        )
+
+
+def _lifted_frame(contact: Contact, here: Space, table: Array) -> Array:
+    """(3, 3) contact axes (t, o, n) as columns in world axes."""
+    if contact.frame is None:
+        return table
+    if here.dim == 3:
+        return contact.frame
+    t, n = here.lift(contact.frame.T)
+    return np.column_stack([t, np.cross(n, t), n])
+
+
+@njit(cache=True)
+def _fill_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ignore[no-untyped-def]
+    """Write R (3, 3), J (nw, K d) and the required wrench b (nw,) at one state."""
+    fill_rotation(q, R)
+    fill_jacobian(R, belief.points, belief.frames, belief.wrench_map, belief.force_map, J)
+    fill_required(
+        R, q, omega, q_d, omega_d, alpha_d, belief.law, belief.mass, belief.inertia, belief.gravity, belief.pivot,
+        belief.wrench_map, b,
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def step_worlds(belief, tolerance, q, omega, q_d, omega_d, alpha_d, wrench, force, residual, status):  # type: ignore[no-untyped-def]
+    """State, solve and certify the problem of every world; answers are written into the last four arrays.
+
+    Args:
+        belief: `Belief`, shared by the worlds.
+        tolerance: largest relative KKT residual of status 0 (solved).
+        q: (W, 4) and omega: (W, 3), the measured orientations and angular velocities, world axes.
+        q_d, omega_d, alpha_d: (4,), (3,), (3,), the reference now.
+        wrench: (W, nw) out, in object axes; nan where the status is 2 (failed: no finite answer).
+        force: (W, K d) out, in contact axes.
+        residual: (W,) out.  status: (W,) out, int8: 0 solved, 1 inaccurate, 2 failed.
+    """
+    nw, n = belief.wrench_map.shape[0], belief.points.shape[0] * belief.force_map.shape[1]
+    R, J, b, H, h = np.empty((3, 3)), np.empty((nw, n)), np.empty(nw), np.empty((n, n)), np.empty(n)
+    for i in range(q.shape[0]):
+        _fill_problem(belief, q[i], omega[i], q_d, omega_d, alpha_d, R, J, b)
+        reduce(J, b, belief.Q_w, belief.Q_f, H, h)
+        planar_force(H, h, belief.mu[0], belief.f_min[0], force[i])
+        balancing_wrench(J, b, force[i], wrench[i])
+        residual[i] = kkt_residual(J, b, belief.Q_w, belief.Q_f, belief.mu, belief.f_min, wrench[i], force[i])
+        if not np.isfinite(residual[i]):
+            status[i] = FAILED
+            wrench[i, :] = np.nan
+        else:
+            status[i] = SOLVED if residual[i] <= tolerance else INACCURATE
+
+
+@njit(cache=True)
+def world_wrench(wrench_map, q, wrench, out):  # type: ignore[no-untyped-def]
+    """Turn wrenches in object axes into (force, torque) at the CoM in WORLD axes, as `xfrc_applied` wants them.
+
+    Args:
+        wrench_map: (nw, 6), see `Space`.  q: (W, 4) object to world.  wrench: (W, nw).
+        out: (W, 6), written; zero where the wrench is not finite: without an answer nothing is applied.
+    """
+    R = np.empty((3, 3))
+    for i in range(q.shape[0]):
+        fill_rotation(q[i], R)
+        for half in (0, 3):
+            for row in range(3):
+                s = 0.0
+                for p in range(3):
+                    for j in range(wrench.shape[1]):
+                        s += R[row, p] * wrench_map[j, half + p] * wrench[i, j]
+                out[i, half + row] = s if np.isfinite(s) else 0.0

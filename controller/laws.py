@@ -1,0 +1,119 @@
+"""Laws: which wrench the object needs, from its state and where it should be; one law, chosen by its coefficients."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from pivoting.controller.space import cross, into, rotation_error
+from pivoting.controller.validate import number, one_of
+
+FORMULATIONS = ("static", "quasi-dynamic", "dynamic")
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """Mass [kg] and inertia about the CoM [kg m^2]: a number in the plane, (3, 3) in object axes in space."""
+
+    mass: float
+    inertia: float | ArrayLike
+
+    def __post_init__(self) -> None:
+        number("mass", self.mass, above=0.0, unit="kg")
+        if np.ndim(self.inertia) == 0:
+            number("inertia", self.inertia, above=0.0, unit="kg m^2")  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class Law:
+    """Commanded angular acceleration and which inertial terms are kept.
+
+    alpha = feedforward alpha_d + kp e + kd (omega_d - omega), about the contact, and the wrench required is
+    (m (a - g), I alpha + c omega x I omega) with a = alpha x rho + c omega x (omega x rho), rho from contact to CoM and
+    c = 1 where velocities count. The three formulations of the notes are three choices of these four coefficients:
+
+    - static: all zero. What balances, J f + w + m g = 0; it does not correct errors.
+    - quasi-dynamic: kp = 1/h^2, all else zero: M (q_d - q)/h^2 = J f + w + m g. On a second-order plant it oscillates
+      (erratum 7), because the velocity that it assumes to be zero is not.
+    - dynamic: the reference's acceleration, feedback on angle and rate, and the velocity terms.
+
+    Attributes:
+        formulation: "static", "quasi-dynamic" or "dynamic".
+        kp: [1/s^2].  kd: [1/s].  feedforward: 0 or 1.  velocity_terms: c, 0 or 1.
+    """
+
+    formulation: str
+    kp: float
+    kd: float
+    feedforward: float
+    velocity_terms: float
+
+    def __post_init__(self) -> None:
+        one_of("formulation", self.formulation, FORMULATIONS)
+        for name in ("kp", "kd", "feedforward", "velocity_terms"):
+            number(name, getattr(self, name), at_least=0.0)
+
+    @classmethod
+    def static(cls) -> Self:
+        """Balance: the notes' first program."""
+        return cls("static", 0.0, 0.0, 0.0, 0.0)
+
+    @classmethod
+    def quasi_dynamic(cls, h: float) -> Self:
+        """The notes' quasi-dynamic motion with step `h` [s], tracking met exactly (dead beat) rather than weighed."""
+        return cls("quasi-dynamic", number("h", h, above=0.0, unit="s") ** -2, 0.0, 0.0, 0.0)
+
+    @classmethod
+    def dynamic(cls, bandwidth: float = 40.0, damping: float = 1.0) -> Self:
+        """Errors decay as a second-order system of natural frequency `bandwidth` [rad/s] and ratio `damping`."""
+        number("bandwidth", bandwidth, above=0.0, unit="rad/s")
+        number("damping", damping, above=0.0)
+        return cls("dynamic", bandwidth**2, 2.0 * damping * bandwidth, 1.0, 1.0)
+
+    @property
+    def coefficients(self) -> tuple[float, float, float, float]:
+        """(feedforward, kp, kd, velocity_terms), as the compiled law takes them."""
+        return self.feedforward, self.kp, self.kd, self.velocity_terms
+
+
+@njit(cache=True)
+def fill_required(R, q, omega, q_d, omega_d, alpha_d, law, mass, inertia, gravity, pivot, wrench_map, out):  # type: ignore[no-untyped-def]
+    """Write the required wrench (nw,) in object axes: what contact and applied wrench must make together.
+
+    Args:
+        R, q: (3, 3), (4,) orientation, object to world; omega: (3,) angular velocity, world axes [rad/s].
+        q_d, omega_d, alpha_d: the reference's orientation, angular velocity and acceleration, likewise.
+        law: (feedforward, kp, kd, velocity_terms).
+        mass: [kg]; inertia: (3, 3) object axes [kg m^2]; gravity: (3,) world axes [m/s^2].
+        pivot: (3,) from the CoM to the point that stays put (the contacts' mean), object axes [m].
+        wrench_map: (nw, 6), see `Space`.
+    """
+    feedforward, kp, kd, c = law
+    e0, e1, e2 = rotation_error(q, q_d)
+    w0, w1, w2 = into(R, omega[0], omega[1], omega[2])
+    v0, v1, v2 = into(R, omega_d[0], omega_d[1], omega_d[2])
+    a0, a1, a2 = into(R, alpha_d[0], alpha_d[1], alpha_d[2])
+    a0 = feedforward * a0 + kp * e0 + kd * (v0 - w0)
+    a1 = feedforward * a1 + kp * e1 + kd * (v1 - w1)
+    a2 = feedforward * a2 + kp * e2 + kd * (v2 - w2)
+    # acceleration of the CoM on its arc about the pivot; rho = -pivot
+    r0, r1, r2 = -pivot[0], -pivot[1], -pivot[2]
+    t0, t1, t2 = cross(a0, a1, a2, r0, r1, r2)
+    u0, u1, u2 = cross(w0, w1, w2, r0, r1, r2)
+    n0, n1, n2 = cross(w0, w1, w2, u0, u1, u2)
+    g0, g1, g2 = into(R, gravity[0], gravity[1], gravity[2])
+    F0 = mass * (t0 + c * n0 - g0)
+    F1 = mass * (t1 + c * n1 - g1)
+    F2 = mass * (t2 + c * n2 - g2)
+    L0 = inertia[0, 0] * w0 + inertia[0, 1] * w1 + inertia[0, 2] * w2
+    L1 = inertia[1, 0] * w0 + inertia[1, 1] * w1 + inertia[1, 2] * w2
+    L2 = inertia[2, 0] * w0 + inertia[2, 1] * w1 + inertia[2, 2] * w2
+    k0, k1, k2 = cross(w0, w1, w2, L0, L1, L2)
+    M0 = inertia[0, 0] * a0 + inertia[0, 1] * a1 + inertia[0, 2] * a2 + c * k0
+    M1 = inertia[1, 0] * a0 + inertia[1, 1] * a1 + inertia[1, 2] * a2 + c * k1
+    M2 = inertia[2, 0] * a0 + inertia[2, 1] * a1 + inertia[2, 2] * a2 + c * k2
+    for row in range(wrench_map.shape[0]):
+        P = wrench_map[row]
+        out[row] = P[0] * F0 + P[1] * F1 + P[2] * F2 + P[3] * M0 + P[4] * M1 + P[5] * M2

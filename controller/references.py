@@ -1,0 +1,132 @@
+"""References: where the object should be at each time, as angle, rate and acceleration."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pivoting.controller.space import Motion
+from pivoting.controller.validate import Array, array, fail, number
+
+
+class Reference(Protocol):
+    """Anything that gives the desired motion at times (N,) [s]: angle, rate and acceleration, each (N,) [rad, s]."""
+
+    def __call__(self, times: Array) -> Motion:
+        """The desired motion at each of `times`."""
+        ...
+
+    @property
+    def angles(self) -> tuple[float, float]:
+        """Least and greatest angle [rad] that it asks for."""
+        ...
+
+
+@dataclass(frozen=True)
+class Constant:
+    """Stay at `theta` [rad]."""
+
+    theta: float
+
+    def __post_init__(self) -> None:
+        number("theta", self.theta, unit="rad")
+
+    def __call__(self, times: Array) -> Motion:
+        zero = np.zeros(np.shape(times))
+        return Motion(zero + self.theta, zero, zero.copy())
+
+    @property
+    def angles(self) -> tuple[float, float]:
+        return self.theta, self.theta
+
+
+@dataclass(frozen=True)
+class MinimumJerk:
+    """Rest-to-rest arcs through `waypoints` [rad], each in `seconds`, resting `hold` seconds before, between, after.
+
+    theta = theta_0 + (theta_1 - theta_0) (10 s^3 - 15 s^4 + 6 s^5), s = t / seconds (Flash and Hogan 1985).
+    """
+
+    waypoints: tuple[float, ...]
+    seconds: float
+    hold: float = 0.0
+
+    def __post_init__(self) -> None:
+        if len(self.waypoints) < 2:
+            raise fail("waypoints", self.waypoints, "at least two angles")
+        for angle in self.waypoints:
+            number("waypoints", angle, unit="rad")
+        number("seconds", self.seconds, above=0.0, unit="s")
+        number("hold", self.hold, at_least=0.0, unit="s")
+
+    @property
+    def duration(self) -> float:
+        """From the first rest to the end of the last [s]."""
+        arcs = len(self.waypoints) - 1
+        return self.hold + arcs * (self.seconds + self.hold)
+
+    def __call__(self, times: Array) -> Motion:
+        times = np.asarray(times, dtype=float)
+        angle = np.full(times.shape, self.waypoints[0])
+        rate, acceleration = np.zeros(times.shape), np.zeros(times.shape)
+        T = self.seconds
+        for i, (start, end) in enumerate(zip(self.waypoints[:-1], self.waypoints[1:], strict=True)):
+            s = np.clip((times - self.hold - i * (T + self.hold)) / T, 0.0, 1.0)
+            angle += (end - start) * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+            rate += (end - start) / T * 30.0 * s**2 * (1.0 - s) ** 2
+            acceleration += (end - start) / T**2 * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
+        return Motion(angle, rate, acceleration)
+
+    @property
+    def angles(self) -> tuple[float, float]:
+        return min(self.waypoints), max(self.waypoints)
+
+
+@dataclass(frozen=True)
+class Sine:
+    """theta = mean + amplitude sin(2 pi t / period) [rad, s]; it starts at full speed, so start slowly or small."""
+
+    mean: float
+    amplitude: float
+    period: float
+
+    def __post_init__(self) -> None:
+        number("mean", self.mean, unit="rad")
+        number("amplitude", self.amplitude, unit="rad")
+        number("period", self.period, above=0.0, unit="s")
+
+    def __call__(self, times: Array) -> Motion:
+        w = 2.0 * np.pi / self.period
+        s, c = np.sin(w * np.asarray(times)), np.cos(w * np.asarray(times))
+        return Motion(self.mean + self.amplitude * s, self.amplitude * w * c, -self.amplitude * w * w * s)
+
+    @property
+    def angles(self) -> tuple[float, float]:
+        return self.mean - abs(self.amplitude), self.mean + abs(self.amplitude)
+
+
+class Sampled:
+    """Angles sampled every `dt` [s], interpolated by a quintic spline; at rest at the last angle after the end."""
+
+    def __init__(self, samples: ArrayLike, dt: float):
+        from scipy.interpolate import make_interp_spline
+
+        self.samples = array("samples", samples, (None,))
+        if self.samples.size < 2:
+            raise fail("samples", self.samples, "at least two angles [rad]")
+        self.dt = number("dt", dt, above=0.0, unit="s")
+        knots = self.dt * np.arange(self.samples.size)
+        self._end = float(knots[-1])
+        order = min(5, self.samples.size - 1)
+        self._curve = make_interp_spline(knots, self.samples, k=order if order % 2 else order - 1)
+
+    def __call__(self, times: Array) -> Motion:
+        times = np.asarray(times, dtype=float)
+        inside = np.clip(times, 0.0, self._end)
+        moving = (times >= 0.0) & (times <= self._end)
+        return Motion(self._curve(inside), *(np.where(moving, self._curve(inside, k), 0.0) for k in (1, 2)))
+
+    @property
+    def angles(self) -> tuple[float, float]:
+        return float(self.samples.min()), float(self.samples.max())

@@ -1,0 +1,179 @@
+"""The plane and space as one thing: rigid-body quantities live in 3-D and a space says which of them are used.
+
+A planar problem is the spatial one seen through two constant maps: 3 of the 6 wrench components and 2 of the 3
+axes of each contact frame. So every formula (Jacobian, law, error) is written once.
+Planar coordinates are (x right, z up), the angle theta counter-clockwise, that is about -y.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from pivoting.controller.validate import Array, array, fail
+
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+class Motion(NamedTuple):
+    """An orientation and how it changes: a measured state or a point of a reference.
+
+    Plane: angle theta [rad], its rate [rad/s] and acceleration [rad/s^2], as floats.
+    Space: unit quaternion (w, x, y, z) object to world, angular velocity and acceleration (3,) in world axes.
+    """
+
+    orientation: float | ArrayLike
+    velocity: float | ArrayLike = 0.0
+    acceleration: float | ArrayLike = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """Which components of the 3-D rigid-body quantities a problem uses.
+
+    Attributes:
+        dim: 2 (plane) or 3 (space).
+        base: (4,) quaternion of the table's frame (tangent, -, normal) in the world; theta = 0 means that the
+            object's axes are the table's. Identity on a level table. In space it is unused.
+    """
+
+    dim: int
+    base: Array
+
+    @cached_property
+    def wrench_map(self) -> Array:
+        """(nw, 6): the wrench components used, out of (force, moment) in 3-D; nw = 3 in the plane, 6 in space."""
+        if self.dim == 3:
+            return np.eye(6)
+        out = np.zeros((3, 6))
+        out[0, 0] = out[1, 2] = 1.0
+        out[2, 4] = -1.0
+        return out
+
+    @cached_property
+    def force_map(self) -> Array:
+        """(3, d): the axes of a contact frame (t, o, n) that carry force: (t, n) in the plane."""
+        return np.eye(3) if self.dim == 3 else np.eye(3)[:, [0, 2]]
+
+    def lift(self, vector: Array) -> Array:
+        """A (..., d) vector as (..., 3); a planar (x, z) becomes (x, 0, z)."""
+        return vector @ self.force_map.T
+
+    def lift_inertia(self, inertia: ArrayLike) -> Array:
+        """The inertia tensor (3, 3) [kg m^2] about the CoM, in object axes; a planar scalar turns about y only."""
+        if self.dim == 3:
+            return array("inertia", inertia, (3, 3))
+        return np.diag([0.0, float(np.asarray(inertia)), 0.0])
+
+    def orientation(self, angle: ArrayLike) -> Array:
+        """(..., 4) quaternion object to world of planar angles (...)."""
+        half = 0.5 * np.asarray(angle, dtype=float)
+        zero = np.zeros_like(half)
+        return quaternion_product(self.base, np.stack([np.cos(half), zero, -np.sin(half), zero], axis=-1))
+
+    def angle(self, quaternion: Array) -> Array:
+        """Planar angles (...) [rad] in (-pi, pi] of quaternions (..., 4) object to world."""
+        relative = quaternion_product(self.base * np.array([1.0, -1.0, -1.0, -1.0]), quaternion)
+        turned = 2.0 * np.arctan2(-relative[..., 2], relative[..., 0])
+        return np.arctan2(np.sin(turned), np.cos(turned))
+
+    def axial(self, rate: ArrayLike) -> Array:
+        """(..., 3) world vector of planar rates (...) about the plane's normal."""
+        axis = -rotation_matrix(self.base)[:, 1]
+        return np.asarray(rate, dtype=float)[..., None] * axis
+
+    def lift_motion(self, motion: Motion) -> tuple[Array, Array, Array]:
+        """Quaternion (4,), angular velocity (3,) and acceleration (3,) in world axes of a `Motion` of this space."""
+        if self.dim == 2:
+            values = [np.asarray(value, dtype=float) for value in motion]
+            for name, value in zip(Motion._fields, values, strict=True):
+                if value.ndim or not np.isfinite(value):
+                    raise fail(name, getattr(motion, name), "a finite number in the plane")
+            return self.orientation(values[0]), self.axial(values[1]), self.axial(values[2])
+        quaternion = array("orientation", motion.orientation, (4,))
+        if abs(np.linalg.norm(quaternion) - 1.0) > 1e-6:
+            raise fail("orientation", quaternion, "a unit quaternion (w, x, y, z)")
+        rates = [np.broadcast_to(np.asarray(rate, dtype=float), (3,)) for rate in motion[1:]]
+        return quaternion, array("velocity", rates[0], (3,)), array("acceleration", rates[1], (3,))
+
+
+def space(dim: int, base: ArrayLike = IDENTITY) -> Space:
+    """The plane (`dim` 2, on a table of frame `base`) or space (`dim` 3)."""
+    return Space(dim, array("base", base, (4,)))
+
+
+def tilt(angle: float) -> Array:
+    """(4,) base of a table that rises to the right by `angle` [rad]."""
+    return np.array([np.cos(0.5 * angle), 0.0, -np.sin(0.5 * angle), 0.0])
+
+
+def quaternion_product(p: Array, q: Array) -> Array:
+    """Hamilton product of (..., 4) quaternions (w, x, y, z)."""
+    pw, px, py, pz = np.moveaxis(np.asarray(p), -1, 0)
+    qw, qx, qy, qz = np.moveaxis(np.asarray(q), -1, 0)
+    return np.stack(
+        [
+            pw * qw - px * qx - py * qy - pz * qz,
+            pw * qx + px * qw + py * qz - pz * qy,
+            pw * qy - px * qz + py * qw + pz * qx,
+            pw * qz + px * qy - py * qx + pz * qw,
+        ],
+        axis=-1,
+    )
+
+
+@njit(cache=True)
+def fill_rotation(q, out):  # type: ignore[no-untyped-def]
+    """Write the rotation matrix (3, 3) of quaternion q (4,) into out; q need not be exactly of unit length."""
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    out[0, 0] = 1.0 - s * (y * y + z * z)
+    out[0, 1] = s * (x * y - w * z)
+    out[0, 2] = s * (x * z + w * y)
+    out[1, 0] = s * (x * y + w * z)
+    out[1, 1] = 1.0 - s * (x * x + z * z)
+    out[1, 2] = s * (y * z - w * x)
+    out[2, 0] = s * (x * z - w * y)
+    out[2, 1] = s * (y * z + w * x)
+    out[2, 2] = 1.0 - s * (x * x + y * y)
+
+
+@njit(cache=True)
+def cross(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
+    """a x b, as three scalars: no arrays in the inner loops."""
+    return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
+
+
+@njit(cache=True)
+def into(R, a0, a1, a2):  # type: ignore[no-untyped-def]
+    """R^T a: a world vector in object axes, as three scalars."""
+    return (
+        R[0, 0] * a0 + R[1, 0] * a1 + R[2, 0] * a2,
+        R[0, 1] * a0 + R[1, 1] * a1 + R[2, 1] * a2,
+        R[0, 2] * a0 + R[1, 2] * a1 + R[2, 2] * a2,
+    )
+
+
+@njit(cache=True)
+def rotation_error(q, q_d):  # type: ignore[no-untyped-def]
+    """Rotation vector [rad], in object axes, that turns orientation q into q_d; its length is at most pi."""
+    # q^-1 q_d, in the object's axes
+    w = q[0] * q_d[0] + q[1] * q_d[1] + q[2] * q_d[2] + q[3] * q_d[3]
+    x = q[0] * q_d[1] - q[1] * q_d[0] - q[2] * q_d[3] + q[3] * q_d[2]
+    y = q[0] * q_d[2] + q[1] * q_d[3] - q[2] * q_d[0] - q[3] * q_d[1]
+    z = q[0] * q_d[3] - q[1] * q_d[2] + q[2] * q_d[1] - q[3] * q_d[0]
+    if w < 0.0:
+        w, x, y, z = -w, -x, -y, -z
+    sine = np.sqrt(x * x + y * y + z * z)
+    scale = 2.0 / w if sine < 1e-9 else 2.0 * np.arctan2(sine, w) / sine
+    return scale * x, scale * y, scale * z
+
+
+def rotation_matrix(quaternion: Array) -> Array:
+    """(3, 3) rotation matrix of one quaternion (4,)."""
+    out = np.empty((3, 3))
+    fill_rotation(np.ascontiguousarray(quaternion, dtype=float), out)
+    return out

@@ -1,0 +1,197 @@
+"""Reading a compiled model: mass, inertia, centre of mass and plane of a body, its support and its friction."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+PLANAR_JOINTS = "two perpendicular slides and then a hinge about their normal"
+
+
+class ModelError(ValueError):
+    """A model, or a body in it, that cannot be served; the message says why and what would be."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlanarBody:
+    """A body that moves in a plane, as its model describes it.
+
+    Object axes are (u, o, v): u the in-plane body axis that lies along the table at theta = 0, o the plane's normal.
+
+    Attributes:
+        name: of the body.  index: its id.
+        mass: [kg].  inertia: about the CoM and the plane's normal [kg m^2].
+        com: (3,) CoM in the body frame [m].
+        axes: (4,) quaternion, object axes to body frame.
+        support: id of the geom it stands on.
+        table: (4,) quaternion of the table's frame (t, o, n) in the world; t is to the right, n the support's normal.
+        origin: (3,) the support's position in the world [m].
+        gravity: (3,) world axes [m/s^2].
+    """
+
+    name: str
+    index: int
+    mass: float
+    inertia: float
+    com: Array
+    axes: Array
+    support: int
+    table: Array
+    origin: Array
+    gravity: Array
+
+    def body_point(self, point: ArrayLike) -> Array:
+        """(3,) body-frame coordinates of a point given along (u, v) from the CoM: the inverse of `point`."""
+        u, v = np.asarray(point, dtype=float)
+        return self.com + matrix(self.axes) @ np.array([u, 0.0, v])
+
+    def point(self, contact: ArrayLike) -> Array:
+        """(2,) from the CoM along the object's in-plane axes (u, v) of a point given in the body frame.
+
+        Args:
+            contact: (3,) in the body frame, or (2,) along (u, v) from the body's origin [m].
+        """
+        given = np.asarray(contact, dtype=float)
+        R = matrix(self.axes)
+        if given.shape == (3,) and np.isfinite(given).all():
+            return (R.T @ (given - self.com))[[0, 2]]
+        if given.shape == (2,) and np.isfinite(given).all():
+            return given - (R.T @ self.com)[[0, 2]]
+        raise ModelError(f"contact = {given.tolist()}: must be 2 in-plane or 3 body-frame coordinates [m], finite")
+
+
+def matrix(quaternion: Array) -> Array:
+    """(3, 3) rotation matrix of a quaternion (4,)."""
+    out = np.empty(9)
+    mujoco.mju_quat2Mat(out, np.asarray(quaternion, dtype=float))
+    return out.reshape(3, 3)
+
+
+def quaternion(rotation: Array) -> Array:
+    """(4,) quaternion of a rotation matrix (3, 3)."""
+    out = np.empty(4)
+    mujoco.mju_mat2Quat(out, np.ascontiguousarray(rotation).ravel())
+    return out
+
+
+def read_body(model: mujoco.MjModel, name: str, support: str | None = None) -> PlanarBody:
+    """What the controller needs to know about a planar body of `model`.
+
+    Args:
+        model: any compiled model.
+        name: a body at the top level, moving by two slides and a hinge, and nothing hanging on it.
+        support: name of the plane or box geom it stands on; by default the only plane of the world body.
+
+    Raises:
+        ModelError: there is no such body, or it cannot be served.
+    """
+    bodies = [model.body(i).name for i in range(1, model.nbody)]
+    if name not in bodies:
+        raise ModelError(f"body = {name!r}: must be one of {', '.join(bodies) or '(the model has none)'}")
+    index = model.body(name).id
+    joints = range(model.body_jntadr[index], model.body_jntadr[index] + model.body_jntnum[index])
+    kinds = [int(model.jnt_type[j]) for j in joints]
+    slide, hinge = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
+    if not kinds:
+        raise ModelError(f"body = {name!r}: it has no joint, so no free motion; needs {PLANAR_JOINTS}")
+    if model.body_parentid[index] != 0:
+        raise ModelError(f"body = {name!r}: it hangs on another body; must be a child of the world")
+    if kinds != [slide, slide, hinge]:
+        words = ", ".join(mujoco.mjtJoint(kind).name.removeprefix("mjJNT_").lower() for kind in kinds)
+        raise ModelError(f"body = {name!r}: its joints are {words}; a planar body needs {PLANAR_JOINTS}")
+    if (model.body_parentid[1:] == index).any():
+        raise ModelError(f"body = {name!r}: other bodies hang on it; their mass would not be counted")
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    first, second, normal = (data.xaxis[j] for j in joints)
+    if abs(first @ second) > 1e-6 or max(abs(first @ normal), abs(second @ normal)) > 1e-6:
+        raise ModelError(f"body = {name!r}: its joint axes are not perpendicular; needs {PLANAR_JOINTS}")
+    ground = read_support(model, support)
+    table = _table_axes(data.geom_xmat[ground].reshape(3, 3)[:, 2], normal)
+    body_to_world = data.xmat[index].reshape(3, 3)
+    axes = _object_axes(body_to_world.T @ table[:, 1])
+    inertial = matrix(model.body_iquat[index])
+    tensor = inertial @ np.diag(model.body_inertia[index]) @ inertial.T
+    return PlanarBody(
+        name=name,
+        index=index,
+        mass=float(model.body_mass[index]),
+        inertia=float(axes[:, 1] @ tensor @ axes[:, 1]),
+        com=np.array(model.body_ipos[index]),
+        axes=quaternion(axes),
+        support=ground,
+        table=quaternion(table),
+        origin=np.array(data.geom_xpos[ground]),
+        gravity=np.array(model.opt.gravity),
+    )
+
+
+def read_support(model: mujoco.MjModel, support: str | None = None) -> int:
+    """Id of the geom that the body stands on: `support`, or else the only plane of the model."""
+    if support is not None:
+        if support not in [model.geom(i).name for i in range(model.ngeom)]:
+            raise ModelError(f"support = {support!r}: the model has no geom of that name")
+        return model.geom(support).id
+    planes = np.flatnonzero(model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE))
+    if len(planes) != 1:
+        raise ModelError(f"support = None: the model has {len(planes)} planes; name the geom that the body stands on")
+    return int(planes[0])
+
+
+def read_friction(model: mujoco.MjModel, body: int, support: int) -> float:
+    """Sliding friction between the body's geoms and `support`, as MuJoCo combines it: the larger, unless priorities differ.
+
+    Raises:
+        ModelError: the body's geoms differ in it; give mu.
+    """
+    geoms = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
+    found = set()
+    for geom in geoms:
+        own, table = model.geom_friction[geom, 0], model.geom_friction[support, 0]
+        order = int(model.geom_priority[geom]) - int(model.geom_priority[support])
+        found.add(float(max(own, table) if order == 0 else own if order > 0 else table))
+    if len(found) != 1:
+        raise ModelError(f"mu = None: the body's geoms give {sorted(found)}; give mu")
+    return found.pop()
+
+
+def place(
+    model: mujoco.MjModel, data: mujoco.MjData, body: PlanarBody, theta: float, point: ArrayLike, at: ArrayLike
+) -> None:
+    """Set qpos so that the body is at angle `theta` [rad] with its `point` (3,) (body frame) `at` (3,) in the world.
+
+    The joints' order (slides, then hinge) makes this exact. Velocities are left alone; kinematics are computed.
+    """
+    start = int(model.body_jntadr[body.index])
+    slots = model.jnt_qposadr[start : start + 3]
+    mujoco.mj_kinematics(model, data)
+    table = matrix(body.table)
+    wanted = table @ matrix(np.array([np.cos(0.5 * theta), 0.0, -np.sin(0.5 * theta), 0.0]))
+    turn = wanted @ (data.xmat[body.index].reshape(3, 3) @ matrix(body.axes)).T
+    axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    along = data.xaxis[start + 2]
+    data.qpos[slots[2]] += np.arctan2(axis @ along, np.trace(turn) - 1.0)
+    mujoco.mj_kinematics(model, data)
+    corner = data.xpos[body.index] + data.xmat[body.index].reshape(3, 3) @ np.asarray(point, dtype=float)
+    for slot, slide in zip(slots[:2], (start, start + 1), strict=True):
+        data.qpos[slot] += data.xaxis[slide] @ (np.asarray(at, dtype=float) - corner)
+    mujoco.mj_kinematics(model, data)
+
+
+def _table_axes(n: Array, plane_normal: Array) -> Array:
+    """(3, 3) columns (t, o, n) in the world: n the support's normal, t to the right, o = n x t."""
+    if abs(n @ plane_normal) > 1e-6:
+        raise ModelError("support: its normal is not in the plane of the body's motion")
+    t = np.cross(plane_normal, n)
+    t = t * np.sign(t[np.argmax(np.abs(t))])
+    return np.column_stack([t, np.cross(n, t), n])
+
+
+def _object_axes(o: Array) -> Array:
+    """(3, 3) columns (u, o, v) in the body frame: u the first body axis that lies in the plane."""
+    for axis in np.eye(3):
+        if abs(axis @ o) < 1e-6:
+            return np.column_stack([axis, o, np.cross(axis, o)])
+    raise ModelError("body: none of its axes lies in the plane of its motion, so theta = 0 is not defined")

@@ -1,0 +1,138 @@
+"""Attach the controller to a body of anyone's MuJoCo model; the closed loop of this package uses nothing else."""
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pivoting.controller.contacts import Contact
+from pivoting.controller.controller import WrenchController, world_wrench
+from pivoting.controller.laws import Body, Law
+from pivoting.controller.solvers import Solution, solve
+from pivoting.controller.space import Motion, quaternion_product
+from pivoting.controller.validate import fail
+from pivoting.models.reading import ModelError, PlanarBody, read_body, read_friction
+
+Array = NDArray[np.float64]
+
+
+class ControlError(RuntimeError):
+    """The state of the simulation cannot be controlled; it carries `time` [s] and `qpos`."""
+
+    def __init__(self, message: str, data: mujoco.MjData):
+        self.time = float(data.time)
+        self.qpos = np.array(data.qpos)
+        super().__init__(f"{message} at time {self.time:g} s, qpos = {self.qpos.tolist()}")
+
+
+class Attached:
+    """A controller bound to a body of one model. `wrench` is all that a loop needs.
+
+    Attributes:
+        body: what was read from the model.
+        controller: the `WrenchController` made from it.
+    """
+
+    def __init__(self, model: mujoco.MjModel, body: PlanarBody, controller: WrenchController):
+        self.body = body
+        self.controller = controller
+        self._model = model
+
+    def state(self, data: mujoco.MjData) -> Motion:
+        """Angle [rad] of the body from its table and rate [rad/s], from `data.qpos` and `data.qvel` as they are now.
+
+        The kinematics of `data` are recomputed: after `mj_step` they describe the state one step back.
+        """
+        if data.qpos.size != self._model.nq:
+            raise fail("data", f"MjData with {data.qpos.size} positions", f"of the attached model ({self._model.nq})")
+        if not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
+            raise ControlError("the state is not finite", data)
+        mujoco.mj_kinematics(self._model, data)
+        mujoco.mj_comPos(self._model, data)
+        mujoco.mj_comVel(self._model, data)
+        omega = data.cvel[self.body.index, :3]
+        return Motion(float(self._angle(data)), float(omega @ self.controller.space.axial(1.0)))
+
+    def _angle(self, data: mujoco.MjData) -> Array:
+        q = quaternion_product(np.array(data.xquat[self.body.index]), self.body.axes)
+        return self.controller.space.angle(q)
+
+    def solution(self, data: mujoco.MjData, reference: float | Motion) -> Solution:
+        """The certified answer at the state of `data`: wrench in object axes, contact force in table axes (f_t, f_n).
+
+        Args:
+            data: of the attached model.
+            reference: where the body should be now, an angle [rad] or a `Motion` (angle, rate, acceleration).
+
+        Raises:
+            ControlError: the state is not finite.
+            SolveError: no answer within tolerance.
+            ValueError: `reference` is not finite.
+        """
+        target = reference if isinstance(reference, Motion) else Motion(reference)
+        return solve(self.controller.problem(self.state(data), target))
+
+    def wrench(self, data: mujoco.MjData, reference: float | Motion) -> Array:
+        """(6,) force [N] and torque [N m] at the CoM in world axes: assign it to `data.xfrc_applied[body]`.
+
+        Arguments and errors as for `solution`.
+        """
+        answer = self.solution(data, reference)
+        q = quaternion_product(np.array(data.xquat[self.body.index]), self.body.axes)
+        out = np.empty((1, 6))
+        world_wrench(self.controller.belief.wrench_map, q[None], answer.wrench[None], out)
+        return out[0]
+
+
+def attach(
+    model: mujoco.MjModel,
+    *,
+    body: str,
+    contacts: Sequence[ArrayLike],
+    law: Law | None = None,
+    mu: float | None = None,
+    margin: float = 0.1,
+    f_min: float = 0.0,
+    Q_w: ArrayLike | None = None,
+    Q_f: ArrayLike | None = None,
+    support: str | None = None,
+) -> Attached:
+    """Make a controller for a planar body of `model`: mass, inertia, CoM, gravity, friction and table are read from it.
+
+    theta = 0 is where the body's first in-plane axis lies along the table, and grows counter-clockwise seen with the
+    table's tangent to the right and its normal up.
+
+    Args:
+        model: any compiled model.
+        body: name of a top-level body that moves by two slides and a hinge.
+        contacts: the point that sticks, in the body frame: [(x, y, z)], or [(u, v)] along its in-plane axes [m].
+        law: default `Law.dynamic()`.
+        mu: friction to plan with; default what MuJoCo combines from the geoms.
+        margin: share of mu kept unused; exactly on the cone's edge nothing sticks.
+        f_min: floor of the normal force [N].
+        Q_w, Q_f: weights, see `WrenchProblem`; Q_w defaults to the lever of the contact as characteristic length.
+        support: name of the geom that the body stands on; default the model's only plane.
+
+    Raises:
+        ModelError: the model cannot be served, with the reason.
+        ValueError: an argument is out of range.
+    """
+    if not isinstance(model, mujoco.MjModel):
+        raise fail("model", model, "a mujoco.MjModel")
+    found = read_body(model, body, support)
+    points = [found.point(contact) for contact in contacts]
+    if len(points) != 1:
+        raise ModelError(f"contacts = {[p.tolist() for p in points]}: must be one point for a planar body")
+    friction = read_friction(model, found.index, found.support) if mu is None else mu
+    controller = WrenchController(
+        Body(found.mass, found.inertia),
+        [Contact(point, friction, f_min) for point in points],
+        Law.dynamic() if law is None else law,
+        found.gravity,
+        base=found.table,
+        margin=margin,
+        Q_w=Q_w,
+        Q_f=Q_f,
+    )
+    return Attached(model, found, controller)

@@ -1,0 +1,167 @@
+"""The closed loop, over a leading world axis: read the state, solve, apply, step. Judged when it is over."""
+
+from collections.abc import Callable
+from time import perf_counter, perf_counter_ns
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+from numpy.typing import NDArray
+
+from pivoting.controller.controller import Belief, step_worlds, world_wrench
+from pivoting.controller.space import Space
+from pivoting.controller.validate import fail
+from pivoting.models.reading import PlanarBody, matrix, place, read_body, read_friction
+from pivoting.models.scenes import BODY, TABLE, corner, instrument, load
+from pivoting.sim.attach import Attached, attach
+from pivoting.sim.fidelity import read_rows
+from pivoting.sim.run import Run
+from pivoting.sim.scenario import Scenario, scenario
+
+Array = NDArray[np.float64]
+TOLERANCE = 1e-9  # relative KKT residual of an answer that counts as solved
+START_DEPTH = 1e-6  # [m]: there is contact from the first step on
+MAX_STEPS = 10_000_000  # worlds times steps that are kept in memory, about 0.5 kB each
+
+
+def simulate(
+    name: str | Scenario,
+    worlds: int = 1,
+    seed: int = 0,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+    **overrides: Any,
+) -> Run:
+    """Run a scenario in closed loop in MuJoCo and measure it.
+
+    Args:
+        name: of a shipped scenario, or a `Scenario`.
+        worlds: how many; they differ by their initial angle errors, drawn from `seed`. World i of one run is world i of
+            any other with the same seed.
+        seed: same seed, same arrays, bit for bit.
+        progress: called with (steps done, steps) about a hundred times.
+        overrides: keys of the scenario; `world={"mu": 0.2}` or `**{"world.mu": 0.2}` changes the world alone.
+
+    Raises:
+        ValueError: an unknown scenario or key, or a value out of range; it is named.
+    """
+    case = (scenario(name) if isinstance(name, str) else name).change(**overrides)
+    for key, value, least in (("worlds", worlds, 1), ("seed", seed, 0)):
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+            raise fail(key, value, f"a whole number >= {least}")
+    attached = believe(case)
+    spec = load(case.path, case.actual)
+    nominal = spec.compile()
+    truth = read_body(nominal, BODY, TABLE)
+    model, where = instrument(spec, truth, TABLE)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that diverges is seen, not reset
+    dt = float(model.opt.timestep)
+    steps = round(case.duration / dt)
+    if steps < 2 or steps * worlds > MAX_STEPS:
+        raise fail("seconds", case.duration, f"2 to {MAX_STEPS} steps in all worlds together, at dt = {dt:g} s")
+    time = dt * np.arange(steps + 1)
+    desired = tuple(np.asarray(values, dtype=float) for values in case.motion(time))
+
+    batch = Batch(model, int(worlds), nthread=1 if worlds == 1 else 0, persistent=True)
+    data = mujoco.MjData(model)
+    at = truth.origin - START_DEPTH * matrix(truth.table)[:, 2]
+    errors = np.deg2rad(case.spread) * np.random.default_rng(seed).uniform(-1.0, 1.0, int(worlds))
+    for qpos, error in zip(batch.bind("qpos"), errors, strict=True):
+        place(model, data, truth, float(desired[0][0] + error), corner(model), at)
+        qpos[:] = data.qpos
+    mujoco.mj_forward(model, data)
+    rows = read_rows(model, data)
+
+    start = perf_counter()
+    log = _loop(batch, attached.controller.belief, attached.controller.space, truth, where, desired, progress)
+    wall = perf_counter() - start
+    sensors, wrench, wrench_world, force, residual, status, control_ns = log
+    read = {key: sensors[..., columns] for key, columns in where.items()}
+    table = matrix(truth.table)[:, [0, 2]]
+    return Run(
+        scenario=case,
+        seed=int(seed),
+        attached=attached,
+        truth=truth,
+        corner_point=truth.point(corner(model)),
+        mu_world=read_friction(model, truth.index, truth.support),
+        contact_rows=rows,
+        time=time,
+        reference=desired,  # type: ignore[arg-type]
+        position=_worlds_first(read["position"]),
+        quaternion=_worlds_first(read["quaternion"]),
+        velocity=_worlds_first(read["velocity"]),
+        angular_velocity=_worlds_first(read["angular_velocity"]),
+        wrench=_worlds_first(wrench),
+        wrench_world=_worlds_first(wrench_world),
+        force=_worlds_first(force).reshape(worlds, steps, 1, 2),
+        force_measured=_worlds_first(read["contact"][1:, :, 1:4] @ table).reshape(worlds, steps, 1, 2),
+        residual=_worlds_first(residual),
+        status=_worlds_first(status),
+        control_us=control_ns / (1e3 * worlds),
+        wall_s=wall,
+    )
+
+
+def believe(case: Scenario) -> Attached:
+    """The controller of a scenario, attached to the world that it believes in."""
+    nominal = load(case.path, case.believed).compile()
+    return attach(
+        nominal,
+        body=BODY,
+        contacts=[corner(nominal)],
+        law=case.control_law(),
+        mu=case.mu,
+        margin=case.margin,
+        f_min=case.f_min,
+        Q_w=case.wrench_weight(),
+        support=TABLE,
+    )
+
+
+def _worlds_first(values: Array) -> Array:
+    """(step, world, ...) as the read-only view (world, step, ...)."""
+    out = np.moveaxis(values, 1, 0)
+    out.flags.writeable = False
+    return out
+
+
+def _loop(
+    batch: Batch,
+    belief: Belief,
+    space: Space,
+    truth: PlanarBody,
+    where: dict[str, slice],
+    desired: tuple[Array, ...],
+    progress: Callable[[int, int], None] | None,
+) -> tuple[Array, ...]:
+    """Step all worlds to the end; the logs, time first: sensors (N+1), wrench, wrench_world, force, residual, status, ns."""
+    steps, worlds = desired[0].size - 1, batch.nsim
+    sensordata, xfrc = batch.bind("sensordata"), batch.bind("xfrc_applied")[:, truth.index]
+    stage = int(mujoco.mjtStage.mjSTAGE_VEL)
+    batch.forward(stage=stage)
+    q, omega = sensordata[:, where["quaternion"]], sensordata[:, where["angular_velocity"]]
+    q_d, omega_d, alpha_d = space.orientation(desired[0]), space.axial(desired[1]), space.axial(desired[2])
+    nw, n = belief.wrench_map.shape[0], belief.Q_f.shape[0]
+    sensors = np.empty((steps + 1, *sensordata.shape))
+    wrench, wrench_world, force = np.empty((steps, worlds, nw)), np.empty((steps, worlds, 6)), np.empty((steps, worlds, n))
+    residual, status, spent = np.empty((steps, worlds)), np.empty((steps, worlds), np.int8), np.empty(steps)
+    answers = (wrench[0], force[0], residual[0], status[0])
+    step_worlds(belief, TOLERANCE, q, omega, q_d[0], omega_d[0], alpha_d[0], *answers)  # compiled before it is timed
+    world_wrench(belief.wrench_map, q, wrench[0], wrench_world[0])
+    sensors[0] = sensordata
+    report = max(1, steps // 100)
+    for k in range(steps):
+        tick = perf_counter_ns()
+        step_worlds(
+            belief, TOLERANCE, q, omega, q_d[k], omega_d[k], alpha_d[k], wrench[k], force[k], residual[k], status[k]
+        )
+        spent[k] = perf_counter_ns() - tick
+        world_wrench(belief.wrench_map, q, wrench[k], wrench_world[k])
+        xfrc[:] = wrench_world[k]
+        batch.step(stage=stage)
+        sensors[k + 1] = sensordata
+        if progress is not None and (k + 1) % report == 0:
+            progress(k + 1, steps)
+    return sensors, wrench, wrench_world, force, residual, status, spent

@@ -1,0 +1,120 @@
+"""The verdict: explicit thresholds on what was measured, and assertions on them for anyone's tests."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from pivoting.sim.run import Run
+    from pivoting.sim.monitor import Measures
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Thresholds of a verdict; all but the slip count after `settle_s`.
+
+    Attributes:
+        slip_m: displacement of the material corner along the table [m].
+        angle_rms_deg, angle_max_deg: error of theta.
+        contact_lost_s: time in which MuJoCo's contact sensor shows no push.
+        force_mismatch_rel: RMS of (measured - predicted contact force) over RMS of the predicted.
+        friction_use: |f_t| / (mu f_n), measured, with the world's mu; at 1 the contact slides.
+        settle_s: what the start may take [s].
+    """
+
+    slip_m: float = 1e-4
+    angle_rms_deg: float = 0.1
+    angle_max_deg: float = 0.2
+    contact_lost_s: float = 0.0
+    force_mismatch_rel: float = 0.05
+    friction_use: float = 0.999
+    settle_s: float = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """One line of the verdict: the worst world's value against its limit.
+
+    Attributes:
+        name: key of the run's summary.  value, limit: in the unit that the name ends with.
+        failed: (W,) which worlds are over the limit, or not finite.
+    """
+
+    name: str
+    value: float
+    limit: float
+    failed: NDArray[np.bool_]
+
+    @property
+    def passed(self) -> bool:
+        """No world failed it."""
+        return not self.failed.any()
+
+
+def judge(measures: "Measures", limits: Limits) -> tuple[Check, ...]:
+    """Every check of a run; a value that is not finite fails."""
+    pairs = {
+        "slip_max_m": (measures.slip_max_m, limits.slip_m),
+        "angle_error_rms_deg": (measures.angle_error_rms_deg, limits.angle_rms_deg),
+        "angle_error_max_deg": (measures.angle_error_max_deg, limits.angle_max_deg),
+        "contact_lost_s": (measures.contact_lost_s, limits.contact_lost_s),
+        "friction_use_max": (measures.friction_use_max, limits.friction_use),
+        "force_mismatch_rel": (measures.force_mismatch_rel, limits.force_mismatch_rel),
+        "unsolved_steps": (measures.unsolved_steps, 0.0),
+    }
+    return tuple(
+        Check(name, float(np.max(value)), limit, ~(value <= limit)) for name, (value, limit) in pairs.items()
+    )
+
+
+def assert_sticking(run: "Run", *, slip_m: float | None = None, contact_lost_s: float | None = None) -> None:
+    """Fail unless the contact stuck in every world: slip, time without contact, friction use and force as predicted.
+
+    Args:
+        run: of `simulate`.
+        slip_m, contact_lost_s: limits in place of the scenario's own.
+
+    Raises:
+        AssertionError: it names the check, the worst world, its value, the limit, and the slip that the simulator itself
+            is expected to cause.
+    """
+    limits = run.scenario.limits
+    over = {
+        "slip_max_m": limits.slip_m if slip_m is None else slip_m,
+        "contact_lost_s": limits.contact_lost_s if contact_lost_s is None else contact_lost_s,
+        "friction_use_max": limits.friction_use,
+        "force_mismatch_rel": limits.force_mismatch_rel,
+    }
+    floor = float(np.max(run.measures.slip_floor_m))
+    _assert_below(run, over, f" (the simulator itself: slip_floor_m = {floor:.3g})")
+
+
+def assert_tracking(run: "Run", *, rms_deg: float | None = None, max_deg: float | None = None) -> None:
+    """Fail unless theta follows the reference in every world.
+
+    Args:
+        run: of `simulate`.
+        rms_deg, max_deg: limits [deg] in place of the scenario's own.
+
+    Raises:
+        AssertionError: it names the check, the worst world, its value and the limit.
+    """
+    limits = run.scenario.limits
+    over = {
+        "angle_error_rms_deg": limits.angle_rms_deg if rms_deg is None else rms_deg,
+        "angle_error_max_deg": limits.angle_max_deg if max_deg is None else max_deg,
+    }
+    _assert_below(run, over, "")
+
+
+def _assert_below(run: "Run", over: dict[str, float], context: str) -> None:
+    wrong = []
+    for name, limit in over.items():
+        values = np.atleast_1d(getattr(run.measures, name))
+        if not (values <= limit).all():
+            world = int(np.argmax(np.where(np.isfinite(values), values, np.inf)))
+            wrong.append(f"{name} = {values[world]:.4g} > {limit:.4g} in world {world}")
+    if wrong:
+        raise AssertionError(f"{run.scenario.name}: " + "; ".join(wrong) + context)
