@@ -129,4 +129,5 @@ class Sampled:
 
     @property
     def angles(self) -> tuple[float, float]:
-        return float(self.samples.min()), float(self.samples.max())
+        between = self(np.linspace(0.0, self._end, 20 * self.samples.size))[0]  # the spline overshoots its samples
+        return min(self.samples.min(), between.min()), max(self.samples.max(), between.max())

@@ -147,11 +147,13 @@ def _closed_form(problem: WrenchProblem, options: Options) -> Answer:
 def _scaled(problem: WrenchProblem) -> tuple[StandardForm, float]:
     """The standard form with forces in units of the load and weights of order one, and the unit [N].
 
-    The cones are homogeneous, so scaling changes nothing but what a solver's absolute tolerances mean.
+    The cones are homogeneous, so scaling changes nothing but what a solver's absolute tolerances mean. Answers are
+    proportional to the unit, so that without a load (unit 0) the answer is exactly nothing.
     """
     form = problem.standard_form()
-    unit = max(float(np.abs(form.b).max()), float(np.abs(form.d).max())) or 1.0
-    return form._replace(P=form.P / np.abs(form.P).max(), b=form.b / unit, d=form.d / unit), unit
+    unit = max(float(np.abs(form.b).max()), float(np.abs(form.d).max()))
+    scale = unit or 1.0
+    return form._replace(P=form.P / np.abs(form.P).max(), b=form.b / scale, d=form.d / scale), unit
 
 
 def _clarabel(problem: WrenchProblem, options: Options) -> Answer:

@@ -50,7 +50,7 @@ def load(path: Path, changes: Mapping[str, float] | None = None) -> mujoco.MjSpe
         block.mass = wanted["mass"]
     if "incline" in wanted:
         half = 0.5 * np.deg2rad(wanted["incline"])
-        table.alt.euler = [np.nan] * 3  # the quaternion alone counts
+        table.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT  # in place of the file's euler
         table.quat = [np.cos(half), 0.0, -np.sin(half), 0.0]
     for geom in (block, table):
         if "mu" in wanted:

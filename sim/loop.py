@@ -9,7 +9,7 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
-from pivoting.controller.controller import Belief, step_worlds, world_wrench
+from pivoting.controller.controller import Belief, WrenchController, step_worlds, world_wrench
 from pivoting.controller.space import Space
 from pivoting.controller.validate import fail
 from pivoting.models.reading import PlanarBody, matrix, place, read_body, read_friction
@@ -30,6 +30,7 @@ def simulate(
     worlds: int = 1,
     seed: int = 0,
     *,
+    controller: WrenchController | None = None,
     progress: Callable[[int, int], None] | None = None,
     **overrides: Any,
 ) -> Run:
@@ -40,6 +41,7 @@ def simulate(
         worlds: how many; they differ by their initial angle errors, drawn from `seed`. World i of one run is world i of
             any other with the same seed.
         seed: same seed, same arrays, bit for bit.
+        controller: to be tested in place of the scenario's own, which is built from what the scenario believes.
         progress: called with (steps done, steps) about a hundred times.
         overrides: keys of the scenario; `world={"mu": 0.2}` or `**{"world.mu": 0.2}` changes the world alone.
 
@@ -50,7 +52,7 @@ def simulate(
     for key, value, least in (("worlds", worlds, 1), ("seed", seed, 0)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
             raise fail(key, value, f"a whole number >= {least}")
-    attached = believe(case)
+    attached = believe(case, controller)
     spec = load(case.path, case.actual)
     nominal = spec.compile()
     truth = read_body(nominal, BODY, TABLE)
@@ -104,9 +106,11 @@ def simulate(
     )
 
 
-def believe(case: Scenario) -> Attached:
-    """The controller of a scenario, attached to the world that it believes in."""
+def believe(case: Scenario, controller: WrenchController | None = None) -> Attached:
+    """The controller of a scenario (or another), attached to the world that the scenario believes in."""
     nominal = load(case.path, case.believed).compile()
+    if controller is not None:
+        return Attached(nominal, read_body(nominal, BODY, TABLE), controller)
     return attach(
         nominal,
         body=BODY,

@@ -53,7 +53,8 @@ class Scenario:
         name, summary: shown by `pivoting list`.
         scene: name of an MJCF file in models/.
         reference: "constant" (stay at theta for seconds), "arc" (theta to theta_end in seconds, at rest for hold before
-            and after), "return" (an arc and back), "sine" (theta + amplitude sin, for seconds).
+            and after), "return" (an arc and back), "sine" (theta + amplitude sin, for seconds); from Python also any
+            `Reference`, for seconds.
         law: "static", "quasi-dynamic", "dynamic".  bandwidth [rad/s], damping: of the dynamic law.
         margin: share of mu kept unused.  f_min: normal-force floor [N].
         length: characteristic length of Q_w [m]; None: the lever of the contact.
@@ -64,7 +65,7 @@ class Scenario:
     name: str
     summary: str
     scene: str
-    reference: str = "constant"
+    reference: str | Reference = "constant"
     theta: float = 30.0
     theta_end: float = 80.0
     seconds: float = 10.0
@@ -91,7 +92,8 @@ class Scenario:
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
-        one_of("reference", self.reference, ("constant", "arc", "return", "sine"))
+        if isinstance(self.reference, str) or not callable(self.reference):
+            one_of("reference", self.reference, ("constant", "arc", "return", "sine"))
         one_of("law", self.law, FORMULATIONS)
         for key in _RANGES:
             if getattr(self, key) is not None:
@@ -122,6 +124,8 @@ class Scenario:
     @property
     def motion(self) -> Reference:
         """The reference, in radians."""
+        if not isinstance(self.reference, str):
+            return self.reference
         start, end = np.deg2rad(self.theta), np.deg2rad(self.theta_end)
         if self.reference == "constant":
             return Constant(start)
@@ -133,7 +137,7 @@ class Scenario:
     def duration(self) -> float:
         """Simulated time [s]."""
         motion = self.motion
-        return motion.duration if isinstance(motion, MinimumJerk) else self.seconds
+        return motion.duration if isinstance(motion, MinimumJerk) and self.reference is not motion else self.seconds
 
     def control_law(self) -> Law:
         """The law; the quasi-dynamic one takes the time constant of `bandwidth` as its step h."""

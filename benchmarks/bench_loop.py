@@ -1,0 +1,112 @@
+"""The closed loop against bare physics: the same scene, alternating in one run.
+
+One world: `simulate` (read, state, solve, certify, apply, step, log) against a loop of nothing but `mj_step`.
+256 worlds: against `Batch.step` with a constant wrench. The physics alone restarts every 200 steps, so that the block
+is still on its corner: a block that lies on its face costs MuJoCo something else. Ratios are medians over pairs.
+"""
+
+import tempfile
+from pathlib import Path
+from time import perf_counter
+
+import mujoco
+import numpy as np
+from harness import main
+from mujoco.batch import Batch
+from pivoting.models import load
+from pivoting.sim import scenario, simulate
+from pivoting.sim.recording import record
+from pivoting.sim.run import Run
+
+SCENARIO, RESTART = "pivot-2d", 200
+
+
+def bare(run: Run, steps: int) -> float:
+    """Seconds a step of `mj_step` alone, one world."""
+    model = load(run.scenario.path, run.scenario.actual).compile()
+    data = mujoco.MjData(model)
+    qpos = model.keyframe("start").qpos
+    wrench = run.wrench_world[0, 50]
+    spent = 0.0
+    for _ in range(steps // RESTART):
+        mujoco.mj_resetData(model, data)
+        data.qpos[:] = qpos
+        data.xfrc_applied[run.truth.index] = wrench
+        start = perf_counter()
+        for _ in range(RESTART):
+            mujoco.mj_step(model, data)
+        spent += perf_counter() - start
+    return spent / (steps // RESTART * RESTART)
+
+
+def open_loop(run: Run, steps: int) -> float:
+    """Seconds a step of `Batch.step` alone, all worlds of the run."""
+    model = load(run.scenario.path, run.scenario.actual).compile()
+    batch = Batch(model, run.worlds)
+    spent = 0.0
+    for _ in range(max(1, steps // RESTART)):
+        batch.reset(stage=int(mujoco.mjtStage.mjSTAGE_NONE))
+        batch.qpos = model.keyframe("start").qpos
+        batch.bind("xfrc_applied")[:, run.truth.index] = run.wrench_world[0, 50]
+        start = perf_counter()
+        for _ in range(RESTART):
+            batch.step()
+        spent += perf_counter() - start
+    return spent / (max(1, steps // RESTART) * RESTART)
+
+
+def measure(quick: bool) -> dict[str, float]:
+    """The figures; see the head of this file."""
+    rounds = 5 if quick else 25
+    first = simulate(SCENARIO)  # compiled and warm before anything is timed
+    steps = first.time.size - 1
+    pairs = []
+    for _ in range(rounds):
+        closed = simulate(SCENARIO)
+        pairs.append((closed.wall_s / steps, bare(closed, steps), float(np.median(closed.control_us))))
+    one = np.array(pairs)
+    fleet = []
+    for _ in range(max(3, rounds // 5)):
+        many = simulate(SCENARIO, worlds=256, seconds=0.2, hold=0.05)
+        fleet.append((many.wall_s / (many.time.size - 1), open_loop(many, many.time.size - 1)))
+    pair = np.array(fleet)
+    return {
+        "one world: closed / bare mj_step": float(np.median(one[:, 0] / one[:, 1])),
+        "one world: closed, us a step": 1e6 * float(np.median(one[:, 0])),
+        "one world: bare mj_step, us": 1e6 * float(np.median(one[:, 1])),
+        "one world: state, solve, certify, us": float(np.median(one[:, 2])),
+        "256 worlds: closed / open Batch.step": float(np.median(pair[:, 0] / pair[:, 1])),
+        "256 worlds: closed, us a step and world": 1e6 / 256 * float(np.median(pair[:, 0])),
+        "256 worlds: open, us a step and world": 1e6 / 256 * float(np.median(pair[:, 1])),
+        **recorded(rounds),
+    }
+
+
+def recorded(rounds: int) -> dict[str, float]:
+    """The loop of a run that is recorded against one that is not; the recording is written when the loop is over."""
+    ratios, writing = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for _ in range(max(5, rounds // 2)):
+            plain = simulate(SCENARIO).wall_s
+            run = simulate(SCENARIO)
+            start = perf_counter()
+            record(run, Path(folder) / "run.rrd")
+            writing.append(perf_counter() - start)
+            ratios.append(run.wall_s / plain)
+    return {
+        "recorded / not recorded, loop": float(np.median(ratios)),
+        "recording written afterwards, s": float(np.median(writing)),
+    }
+
+
+if __name__ == "__main__":
+    assert scenario(SCENARIO).scene == SCENARIO
+    main(
+        __doc__ or "",
+        measure,
+        {
+            "one world: closed / bare mj_step": 5.0,
+            "256 worlds: closed / open Batch.step": 1.5,
+            "recorded / not recorded, loop": 1.1,
+        },
+    )

@@ -1,0 +1,180 @@
+"""The command line: `pivoting example | list | run`. Exit 0 for a pass, 1 for a fail, 2 for bad usage in one line."""
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+# MuJoCo, numba and rerun are imported by the commands that need them: `pivoting --help` answers at once.
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="pivoting", message="%(package)s %(version)s")
+def cli() -> None:
+    """The smallest wrench that balances or pivots an object on a frictional contact, proved in MuJoCo."""
+
+
+@cli.command()
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
+@click.option("--figure", type=click.Path(path_type=Path), help="Also draw the solution space, a .png, .svg or .pdf file.")
+def example(as_json: bool, figure: Path | None) -> int:
+    """Solve the notes' worked example by every method; exit 0 if all printed digits agree."""
+    from rich.console import Console
+
+    from pivoting.controller.example import EXAMPLES, compare_all
+    from pivoting.sim.report import jsonable, print_examples
+
+    if figure is not None:
+        _check_figure(figure)
+    results = compare_all()
+    agree = all(digit.agrees for digits, _ in results for digit in digits)
+    if figure is not None:
+        from pivoting.sim.figure import draw_solution_space
+
+        draw_solution_space(results[0][1], figure, f"The notes' worked example, {EXAMPLES[0].summary}")
+    if as_json:
+        rows = [
+            {
+                "example": digits[0].example,
+                "method": digits[0].method,
+                "status": solution.status,
+                "residual": solution.residual,
+                "agrees": all(digit.agrees for digit in digits),
+                "digits": {
+                    digit.quantity: {
+                        "printed": digit.expected,
+                        "value": digit.value,
+                        "agrees": digit.agrees,
+                        "rounds_to_printed": digit.rounds,
+                    }
+                    for digit in digits
+                },
+            }
+            for digits, solution in results
+        ]
+        click.echo(json.dumps(jsonable({"agrees": agree, "results": rows}), allow_nan=False))
+    else:
+        print_examples(Console(), results)
+        if figure is not None:
+            click.echo(f"wrote {figure}")
+    return 0 if agree else 1
+
+
+@cli.command("list")
+def list_scenarios() -> int:
+    """The scenarios, a line each."""
+    from rich.console import Console
+
+    from pivoting.sim.report import print_scenarios
+
+    print_scenarios(Console())
+    return 0
+
+
+@cli.command()
+@click.argument("scenario")
+@click.option("--worlds", type=click.IntRange(min=1), default=1, show_default=True, help="How many worlds.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the initial errors.")
+@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key, or world.KEY for the world alone.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for SCENARIO.rrd and summary.json.")
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object and nothing else.")
+def run(scenario: str, worlds: int, seed: int, settings: tuple[str, ...], out: Path | None, as_json: bool) -> int:
+    """Run SCENARIO in closed loop in MuJoCo; exit 0 if the verdict passes, 1 if it fails."""
+    from pivoting.sim.loop import simulate
+    from pivoting.sim.scenario import scenario as find
+
+    case = find(scenario).change(**_settings(settings))
+    if out is not None:
+        _make_folder(out)
+    with _progress(f"{scenario}, {worlds} world{'s' * (worlds > 1)}") as report:
+        finished = simulate(case, worlds, seed, progress=report)
+
+    from rich.console import Console
+
+    from pivoting.sim.report import jsonable, print_run
+
+    text = json.dumps(jsonable(finished.summary()), allow_nan=False, indent=None if as_json else 1)
+    if not as_json:
+        print_run(Console(), finished)
+    if out is not None:
+        from pivoting.sim.recording import record
+
+        world = int(finished.failed_worlds[0]) if finished.failed_worlds.size else 0
+        recording = record(finished, out / f"{scenario}.rrd", world=world)
+        partial = out / ".summary.json.part"
+        partial.write_text(json.dumps(jsonable(finished.summary()), allow_nan=False, indent=1) + "\n")
+        partial.replace(out / "summary.json")
+        click.echo(f"wrote {out / 'summary.json'} and {recording} (world {world}); to see it: rerun {recording}", err=as_json)
+    if as_json:
+        click.echo(text)
+    return 1 if finished.verdict == "fail" else 0
+
+
+def main() -> None:
+    """Entry point: every wrong use ends in one line on stderr and exit code 2."""
+    try:
+        code = cli.main(standalone_mode=False)
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        code = 2
+    except click.ClickException as error:
+        code = _refuse(error.format_message())
+    except (ValueError, OSError) as error:
+        code = _refuse(str(error))
+    except click.Abort:
+        code = 130
+    sys.exit(code)
+
+
+def _refuse(message: str) -> int:
+    click.echo("pivoting: " + " ".join(message.split()), err=True)
+    return 2
+
+
+def _settings(pairs: tuple[str, ...]) -> dict[str, Any]:
+    out = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals or not key or not value:
+            raise click.BadParameter(f"--set {pair!r}: must be KEY=VALUE")
+        out[key] = value
+    return out
+
+
+def _make_folder(out: Path) -> None:
+    """Find out before the work that its results can be kept."""
+    if out.exists() and not out.is_dir():
+        raise click.BadParameter(f"--out {str(out)!r}: must be a folder")
+    out.mkdir(parents=True, exist_ok=True)
+
+
+def _check_figure(figure: Path) -> None:
+    if figure.suffix not in (".png", ".svg", ".pdf"):
+        raise click.BadParameter(f"--figure {str(figure)!r}: must end in .png, .svg or .pdf")
+    if not figure.parent.is_dir():
+        raise click.BadParameter(f"--figure {str(figure)!r}: its folder does not exist")
+
+
+class _progress:  # noqa: N801
+    """A progress bar on stderr, where that is a terminal; as a context, it gives the function that advances it."""
+
+    def __init__(self, title: str):
+        from rich.console import Console
+        from rich.progress import Progress
+
+        console = Console(stderr=True)
+        self._bar = Progress(console=console, transient=True, disable=not console.is_terminal)
+        self._task = self._bar.add_task(title, total=None)
+
+    def __enter__(self) -> Callable[[int, int], None]:
+        self._bar.start()
+        return self._advance
+
+    def _advance(self, done: int, steps: int) -> None:
+        self._bar.update(self._task, completed=done, total=steps)
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()

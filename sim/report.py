@@ -1,0 +1,112 @@
+"""What people read: tables of a run, of the scenarios and of the worked example."""
+
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from pivoting.controller.example import EXAMPLES, Digit
+from pivoting.controller.solvers import Solution
+from pivoting.sim.run import Run
+from pivoting.sim.scenario import SCENARIOS
+
+# name in the summary: (what people read, factor, unit)
+_LINES = {
+    "slip_max_m": ("slip of the corner", 1e3, "mm"),
+    "angle_error_rms_deg": ("angle error, RMS", 1.0, "deg"),
+    "angle_error_max_deg": ("angle error, greatest", 1.0, "deg"),
+    "contact_lost_s": ("time without contact", 1.0, "s"),
+    "friction_use_max": ("friction used, |f_t| / (mu f_n)", 1.0, ""),
+    "force_mismatch_rel": ("contact force, predicted against measured", 100.0, "%"),
+    "unsolved_steps": ("steps without a certified answer", 1.0, ""),
+}
+
+
+def print_run(console: Console, run: Run) -> None:
+    """The verdict table of a run."""
+    summary = run.summary()
+    table = Table(title=f"{run.scenario.name}: {run.scenario.summary}", title_justify="left")
+    for heading in ("measured in MuJoCo" + (", worst world" if run.worlds > 1 else ""), "value", "limit", ""):
+        table.add_column(heading, justify="right" if heading in ("value", "limit") else "left")
+    for check in run.checks:
+        words, factor, unit = _LINES[check.name]
+        table.add_row(
+            words,
+            f"{_short(factor * check.value)} {unit}".strip(),
+            f"{_short(factor * check.limit)} {unit}".strip(),
+            "[green]pass[/]" if check.passed else "[red]FAIL[/]",
+        )
+        if check.name == "slip_max_m":
+            floor = 1e3 * summary["slip_floor_m"]
+            table.add_row("  of which the simulator's own, predicted", f"{_short(floor)} mm", "", "", style="dim")
+    console.print(table)
+    failed = run.failed_worlds.size
+    console.print(
+        f"verdict: [bold]{'[green]pass' if not failed else '[red]fail'}[/][/]"
+        f"   worlds: {run.worlds - failed} of {run.worlds} within limits"
+        f"   greatest KKT residual: {summary['residual_max']:.1e}"
+    )
+    console.print(
+        f"{summary['sim_s']:g} s simulated in {summary['wall_s']:.2f} s; stating, solving and certifying the problem:"
+        f" {summary['solve_us_median']:.1f} us a step (99th percentile {summary['solve_us_p99']:.1f})"
+    )
+
+
+def print_scenarios(console: Console) -> None:
+    """A line for each scenario."""
+    width = max(len(name) for name in SCENARIOS)
+    for name, case in SCENARIOS.items():
+        console.print(f"{name:{width}}  {case.summary}", highlight=False, soft_wrap=True)
+
+
+def print_examples(console: Console, results: list[tuple[list[Digit], Solution]]) -> None:
+    """The worked example: what is printed against what is solved, then how far each method is from it."""
+    for example in EXAMPLES:
+        mine = [(digits, solution) for digits, solution in results if digits[0].example == example.name]
+        console.print(f"[bold]{example.name}[/]: {example.summary}", soft_wrap=True)
+        table = Table()
+        for heading in ("", "expected", "solved", "last digit"):
+            table.add_column(heading, justify="left" if not heading else "right")
+        for digit in mine[0][0]:
+            places = len(digit.expected.partition(".")[2]) + 2
+            word = "same" if digit.rounds else "1 apart" if digit.agrees else "[red]DIFFERS[/]"
+            table.add_row(digit.quantity, digit.expected, f"{digit.value:.{places}f}", word)
+        console.print(table)
+    methods = Table()
+    for heading in ("method", *(f"KKT residual, {example.name}" for example in EXAMPLES), "digits"):
+        methods.add_column(heading, justify="left" if heading == "method" else "right")
+    for name in dict.fromkeys(digits[0].method for digits, _ in results):
+        own = [(digits, solution) for digits, solution in results if digits[0].method == name]
+        cells = [
+            f"{solution.residual:.0e}" + ("" if solution.status == "solved" else f" ({solution.status})")
+            for _, solution in own
+        ]
+        agree = all(digit.agrees for digits, _ in own for digit in digits)
+        methods.add_row(name, *cells, "[green]agree[/]" if agree else "[red]DIFFER[/]")
+    console.print(methods)
+    exact = [digit for digit in results[0][0] if digit.agrees and not digit.rounds]
+    for digit in exact:
+        console.print(
+            f"{digit.quantity}: the notes print {digit.expected}; the optimum is {digit.value:.7f}, one unit of the last"
+            " digit away, which is what their solver's tolerance leaves (docs/errata.md).",
+            soft_wrap=True,
+            highlight=False,
+        )
+
+
+def jsonable(value: Any) -> Any:
+    """`value` with NumPy scalars as numbers and what is not finite as null: JSON has no nan."""
+    if isinstance(value, dict):
+        return {key: jsonable(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [jsonable(item) for item in value]
+    if isinstance(value, np.generic):
+        return jsonable(value.item())
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value
+
+
+def _short(value: float) -> str:
+    return f"{value:.3g}" if np.isfinite(value) else "not finite"

@@ -1,0 +1,160 @@
+"""The closed loop: what it must show in MuJoCo, determinism, and what a run is made of."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from pivoting.controller import Motion, solve
+from pivoting.controller.references import Sampled
+from pivoting.sim import Run, assert_sticking, assert_tracking, simulate
+
+
+def test_balance(shipped: Callable[[str], Run]) -> None:
+    """10 s on the corner: slip <= 0.02 mm, angle error after 0.5 s <= 0.005 deg, force mismatch <= 1 %."""
+    run = shipped("balance-2d")
+    assert run.time[-1] == pytest.approx(10.0)
+    assert run.measures.slip_max_m[0] <= 2e-5
+    assert np.rad2deg(np.abs(run.angle_error[0, run.time >= 0.5])).max() <= 0.005
+    assert run.measures.force_mismatch_rel[0] <= 0.01
+    assert run.verdict == "pass"
+
+
+def test_incline_measures_the_printed_force(shipped: Callable[[str], Run]) -> None:
+    """MuJoCo's own contact sensor shows the notes' f_t = 1.39789, f_n = 4.65964 within 0.2 %, all the time."""
+    run = shipped("incline-2d")
+    measured = run.force_measured[0, run.time[:-1] >= 0.5, 0]
+    np.testing.assert_allclose(measured, np.tile([1.39789, 4.65964], (len(measured), 1)), rtol=0.002)
+    assert run.measures.force_mismatch_rel[0] <= 0.01
+    assert run.verdict == "pass"
+    assert run.mu_world == 0.4
+    assert run.attached.controller.contacts[0].mu == 0.3
+
+
+def test_pivot(shipped: Callable[[str], Run]) -> None:
+    """10 to 80 deg and back: slip <= 0.02 mm, RMS <= 0.02 deg, mismatch <= 1 %, no step at all without contact."""
+    run = shipped("pivot-2d")
+    assert run.measures.slip_max_m[0] <= 2e-5
+    assert run.measures.angle_error_rms_deg[0] <= 0.02
+    assert (run.force_measured[0, :, 0, 1] > 0.0).all()
+    assert run.measures.force_mismatch_rel[0] <= 0.01
+    assert np.rad2deg(run.theta[0]).max() == pytest.approx(80.0, abs=0.05)
+    assert np.rad2deg(run.theta[0, [0, -1]]) == pytest.approx([10.0, 10.0], abs=0.05)
+    assert run.verdict == "pass"
+    assert_sticking(run, slip_m=2e-5)
+    assert_tracking(run, rms_deg=0.02)
+
+
+def test_snap(shipped: Callable[[str], Run]) -> None:
+    """10 to 80 deg in 0.3 s: slip <= 0.1 mm, RMS <= 0.1 deg, mismatch <= 5 %, no step without contact."""
+    run = shipped("snap-2d")
+    assert run.measures.slip_max_m[0] <= 1e-4
+    assert run.measures.angle_error_rms_deg[0] <= 0.1
+    assert (run.force_measured[0, run.time[:-1] >= 0.1, 0, 1] > 0.0).all()
+    assert run.measures.force_mismatch_rel[0] <= 0.05
+    assert np.abs(run.omega).max() > 7.0
+    assert run.verdict == "pass"
+
+
+def test_every_step_is_certified(shipped: Callable[[str], Run]) -> None:
+    for name in ("balance-2d", "incline-2d", "pivot-2d", "snap-2d"):
+        run = shipped(name)
+        assert run.residual.max() <= 1e-11
+        assert not run.status.any()
+
+
+def test_the_loop_solves_the_same_problem_as_people_do(shipped: Callable[[str], Run]) -> None:
+    """A step's logged answer, against the problem stated by `WrenchController.problem` and solved by Clarabel."""
+    run = shipped("pivot-2d")
+    for k in (0, 700, 1300, 2600, 4000):
+        desired = Motion(*(float(values[k]) for values in run.reference))
+        problem = run.attached.controller.problem(Motion(run.theta[0, k], run.omega[0, k]), desired)
+        other = solve(problem, "clarabel")
+        np.testing.assert_allclose(run.wrench[0, k], other.wrench, atol=1e-6)
+        np.testing.assert_allclose(run.force[0, k], other.force, atol=1e-6)
+
+
+def test_energy_is_accounted_for(shipped: Callable[[str], Run]) -> None:
+    """Conserved quantity: work of the applied wrench = gain of kinetic and potential energy; a stuck contact does none."""
+    run = shipped("pivot-2d")
+    dx = np.diff(run.position[0], axis=0)
+    dtheta = np.diff(run.theta[0])
+    work = np.cumsum((run.wrench_world[0, :, :3] * dx).sum(axis=1) - run.wrench_world[0, :, 4] * dtheta)
+    energy = 10.0 * run.position[0, :, 2] + 0.5 * (run.velocity[0] ** 2).sum(axis=1) + run.omega[0] ** 2 / 12.0
+    np.testing.assert_allclose(work, energy[1:] - energy[0], atol=0.01)
+
+
+def test_same_seed_same_arrays() -> None:
+    one, two = (simulate("pivot-2d", worlds=5, seed=3, seconds=0.2) for _ in range(2))
+    for name in ("position", "quaternion", "wrench", "wrench_world", "force", "force_measured", "residual", "status"):
+        assert np.array_equal(getattr(one, name), getattr(two, name)), name
+    other = simulate("pivot-2d", worlds=5, seed=4, seconds=0.2)
+    assert not np.array_equal(one.theta[:, 0], other.theta[:, 0])
+
+
+def test_world_i_is_the_same_in_any_fleet() -> None:
+    few, many = (simulate("pivot-2d", worlds=n, seed=3, seconds=0.2) for n in (1, 6))
+    assert np.array_equal(few.theta[0], many.theta[0])
+    assert np.array_equal(few.force_measured[0], many.force_measured[0])
+    assert len({float(angle) for angle in many.theta[:, 0]}) == 6
+
+
+def test_worlds_start_within_the_spread_and_converge() -> None:
+    run = simulate("pivot-2d", worlds=16, seed=1, seconds=0.5, spread=0.5)
+    start = np.rad2deg(run.angle_error[:, 0])
+    assert 0.2 < np.abs(start).max() <= 0.5
+    assert np.abs(np.rad2deg(run.angle_error[:, -1])).max() < 0.01
+
+
+def test_mirrored_world_gives_the_mirrored_force() -> None:
+    """Symmetry: at 90 - theta the block is its own mirror image, so f_t and the moment change sign, f_n does not."""
+    left, right = (simulate("balance-2d", theta=theta, seconds=0.5, spread=0.0) for theta in (30.0, 60.0))
+    np.testing.assert_allclose(left.force[0, -1, 0] * [-1.0, 1.0], right.force[0, -1, 0], atol=1e-4)
+    np.testing.assert_allclose(left.wrench[0, -1, 2], -right.wrench[0, -1, 2], atol=1e-4)
+
+
+def test_a_reference_of_ones_own() -> None:
+    samples = np.deg2rad(30.0 + 10.0 * np.sin(np.linspace(0.0, np.pi, 21)) ** 2)
+    run = simulate("pivot-2d", reference=Sampled(samples, 0.05), seconds=1.2)
+    assert run.verdict == "pass"
+    assert np.rad2deg(run.theta.max()) == pytest.approx(40.0, abs=0.05)
+
+
+def test_sine_and_other_sizes() -> None:
+    """Ten times smaller, a hundred times heavier, on a slope, another friction: the same program."""
+    run = simulate("balance-2d", reference="sine", seconds=2.0, theta=40, amplitude=5, size=0.1, mass=100, mu=0.8,
+                   incline=-10, gravity=9.81)  # fmt: skip
+    assert run.verdict == "pass", run.checks
+    assert run.truth.mass == pytest.approx(100.0)
+    assert run.attached.controller.body.mass == pytest.approx(100.0)
+
+
+def test_arrays_cannot_be_changed(shipped: Callable[[str], Run]) -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        shipped("balance-2d").wrench[0, 0] = 0.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"name": "fly-2d"}, "scenario = 'fly-2d'.*balance-2d"),
+        ({"worlds": 0}, "worlds = 0.*>= 1"),
+        ({"worlds": 2.5}, "worlds = 2.5.*whole number"),
+        ({"seed": -1}, "seed = -1.*>= 0"),
+        ({"mass": float("nan")}, "mass = nan.*> 0"),
+        ({"theta": 0.0}, "theta = 0.0.*> 0"),
+        ({"theta": 90}, "theta = 90.0.*< 90"),
+        ({"theta_end": -5}, "theta_end = -5.*> 0"),
+        ({"reference": "sine", "theta": 5, "amplitude": 10}, "theta = 5.*stays on its corner"),
+        ({"mu": 0}, "mu = 0.0.*> 0"),
+        ({"law": "magic"}, "law = 'magic'.*dynamic"),
+        ({"reference": "spiral"}, "reference = 'spiral'.*arc"),
+        ({"masss": 1.0}, "masss = 1.0.*known key"),
+        ({"world": {"dt": 1.0}}, "world.dt = 1.0.*world.mu"),
+        ({"world.mu": -1.0}, "world.mu = -1.0.*> 0"),
+        ({"seconds": 3000.0, "dt": 1e-4}, "seconds = .*steps"),
+    ],
+)
+def test_bad_input_is_named(arguments: dict, message: str) -> None:
+    arguments = {"name": "pivot-2d", **arguments}
+    with pytest.raises(ValueError, match=message):
+        simulate(**arguments)

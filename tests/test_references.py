@@ -1,0 +1,55 @@
+"""References: their rates and accelerations are the derivatives of their angles, and they start and end at rest."""
+
+import numpy as np
+import pytest
+from pivoting.controller.references import Constant, MinimumJerk, Reference, Sampled, Sine
+
+ALL = {
+    "constant": Constant(0.4),
+    "arc": MinimumJerk((0.2, 1.3, 0.4), 1.0, 0.3),
+    "sine": Sine(0.7, 0.2, 1.5),
+    "samples": Sampled(0.5 + 0.3 * np.sin(np.linspace(0.0, 4.0, 60)), 0.05),
+}
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_derivatives(name: str) -> None:
+    reference: Reference = ALL[name]
+    t, h = np.linspace(0.05, 2.85, 97), 1e-5
+    angle, rate, acceleration = reference(t)
+    before, after = reference(t - h), reference(t + h)
+    np.testing.assert_allclose(rate, (after[0] - before[0]) / (2 * h), atol=1e-6)
+    np.testing.assert_allclose(acceleration, (after[1] - before[1]) / (2 * h), atol=2e-3)
+    low, high = reference.angles
+    assert low - 1e-6 <= angle.min()
+    assert angle.max() <= high + 1e-6
+
+
+def test_minimum_jerk_rests_at_its_waypoints() -> None:
+    arc = MinimumJerk((0.2, 1.3, 0.4), 1.0, 0.3)
+    assert arc.duration == pytest.approx(2.9)
+    for time, angle in ((0.0, 0.2), (0.3, 0.2), (1.3, 1.3), (1.6, 1.3), (2.6, 0.4), (9.0, 0.4)):
+        assert [float(value) for value in arc(np.array(time))] == pytest.approx([angle, 0.0, 0.0], abs=1e-12)
+
+
+def test_samples_are_met_and_held() -> None:
+    samples = np.array([0.3, 0.35, 0.5, 0.8, 1.0, 1.1, 1.15])
+    reference = Sampled(samples, 0.1)
+    np.testing.assert_allclose(reference(0.1 * np.arange(7))[0], samples, atol=1e-12)
+    assert [float(value) for value in reference(np.array(5.0))] == pytest.approx([1.15, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Constant(float("nan")), "theta = nan"),
+        (lambda: MinimumJerk((0.1,), 1.0), "waypoints = "),
+        (lambda: MinimumJerk((0.1, 0.2), 0.0), "seconds = 0"),
+        (lambda: Sine(0.1, 0.1, 0.0), "period = 0"),
+        (lambda: Sampled([0.1], 0.1), "samples = "),
+        (lambda: Sampled([0.1, float("nan")], 0.1), "samples = .*finite"),
+    ],
+)
+def test_bad_input_is_named(make, message: str) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(ValueError, match=message):
+        make()
