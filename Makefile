@@ -6,6 +6,7 @@ STAMP := .venv/.installed
 .PHONY: demo test check bench evidence figures clean
 
 demo: $(STAMP)
+	@mkdir -p out
 	$(BIN)/pivoting example --figure out/solution-space.png
 	$(BIN)/pivoting run pivot-2d --out out
 	@echo "the solution space: out/solution-space.png; the recording: $(BIN)/rerun out/pivot-2d.rrd"
@@ -17,7 +18,6 @@ check: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pyright
 
 bench: $(STAMP)
 	$(BIN)/python benchmarks/bench_loop.py --json benchmarks/results/loop.json

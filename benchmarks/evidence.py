@@ -1,4 +1,4 @@
-"""Slow evidence: random problems against an independent solver, and fleets of every scenario; worst values, no averages."""
+"""Slow evidence: random problems against an independent solver, and fleets of every scenario; worst values."""
 
 import sys
 from pathlib import Path
@@ -10,7 +10,7 @@ from pivoting.sim import SCENARIOS, simulate
 from rich.progress import track
 
 sys.path.insert(0, str(Path(__file__).parent.parent))  # the same random problems as the tests
-from tests.conftest import random_problem  # noqa: E402
+from tests.conftest import random_problem
 
 ORACLE = "qp:quadprog"
 

@@ -1,5 +1,12 @@
 """The mathematics: contacts, the wrench problem, its solvers, laws and references. Knows nothing of MuJoCo."""
 
+from pathlib import Path
+
+from pivoting.controller.stale import drop_stale_kernels
+
+drop_stale_kernels(Path(__file__).parent)  # before any kernel is loaded
+
+# ruff: noqa: E402
 from pivoting.controller.contacts import Contact
 from pivoting.controller.controller import WrenchController
 from pivoting.controller.laws import Body, Law

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
-
 from pivoting.controller.space import cross
 from pivoting.controller.validate import Array, array, fail, number
 

@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
-
 from pivoting.controller.certificate import kkt_residual
 from pivoting.controller.closed_form import balancing_wrench, planar_force, reduce
 from pivoting.controller.contacts import Contact, fill_jacobian
@@ -50,7 +49,7 @@ class WrenchController:
         contacts: the contacts that are to stick, all planar or all spatial.
         law: static, quasi-dynamic or dynamic.
         gravity: (d,) in world axes [m/s^2]; in the plane (x, z), or (3,) for a plane that is not x-z.
-        base: (4,) quaternion of the table in the world, for planar contacts on a tilted table; theta is measured from it.
+        base: (4,) quaternion of the table in the world, for planar contacts; theta is measured from the table.
         margin: share of mu kept unused.
         Q_w, Q_f: weights in object axes; Q_w defaults to a characteristic length of |pivot| (see `wrench_weight`).
     """
@@ -123,7 +122,7 @@ class WrenchController:
         )
 
     def problem(self, state: Motion, desired: Motion | None = None) -> WrenchProblem:
-        """The wrench problem, in object axes, at `state` (its acceleration is not used) with the reference at `desired`.
+        """The wrench problem, in object axes, at `state` (acceleration not used), reference at `desired`.
 
         With `desired` left out the object is to stay where it is.
         """

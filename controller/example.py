@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-
 from pivoting.controller.contacts import Contact
 from pivoting.controller.controller import WrenchController
 from pivoting.controller.laws import Body, Law

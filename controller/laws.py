@@ -6,7 +6,6 @@ from typing import Self
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
-
 from pivoting.controller.space import cross, into, rotation_error
 from pivoting.controller.validate import number, one_of
 

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-
 from pivoting.controller.certificate import kkt_residual
 from pivoting.controller.validate import Array, array, fail, number, positive_definite
 
@@ -109,9 +108,7 @@ class WrenchProblem:
     def residual(self, wrench: Array, force: Array) -> float:
         """Relative KKT residual of an answer, see `certificate.kkt_residual`; nan if it is not finite."""
         w, f = np.array(wrench, dtype=float), np.array(force, dtype=float).ravel()
-        return float(
-            kkt_residual(self.jacobian, self.required, self.Q_w, self.Q_f, self.mu_planned, self.f_min, w, f)
-        )
+        return float(kkt_residual(self.jacobian, self.required, self.Q_w, self.Q_f, self.mu_planned, self.f_min, w, f))
 
     def standard_form(self) -> StandardForm:
         """The planar problem as the notes' QP in x = (f, w), with rows of C: floor, right edge, left edge.

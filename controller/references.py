@@ -5,7 +5,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
-
 from pivoting.controller.space import Motion
 from pivoting.controller.validate import Array, array, fail, number
 
@@ -129,5 +128,5 @@ class Sampled:
 
     @property
     def angles(self) -> tuple[float, float]:
-        between = self(np.linspace(0.0, self._end, 20 * self.samples.size))[0]  # the spline overshoots its samples
-        return min(self.samples.min(), between.min()), max(self.samples.max(), between.max())
+        between = self._curve(np.linspace(0.0, self._end, 20 * self.samples.size))  # the spline overshoots its samples
+        return float(min(self.samples.min(), between.min())), float(max(self.samples.max(), between.max()))

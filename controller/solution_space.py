@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-
 from pivoting.controller.problem import WrenchProblem
 from pivoting.controller.solvers import Solution
 from pivoting.controller.validate import Array, fail

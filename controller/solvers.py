@@ -8,7 +8,6 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-
 from pivoting.controller.closed_form import balancing_wrench, planar_force, reduce
 from pivoting.controller.problem import StandardForm, WrenchProblem
 from pivoting.controller.validate import Array, fail, number

@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
-
 from pivoting.controller.validate import Array, array, fail
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])

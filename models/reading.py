@@ -141,7 +141,7 @@ def read_support(model: mujoco.MjModel, support: str | None = None) -> int:
 
 
 def read_friction(model: mujoco.MjModel, body: int, support: int) -> float:
-    """Sliding friction between the body's geoms and `support`, as MuJoCo combines it: the larger, unless priorities differ.
+    """Sliding friction between the body's geoms and `support`, as MuJoCo combines it: the larger, or by priority.
 
     Raises:
         ModelError: the body's geoms differ in it; give mu.

@@ -6,7 +6,6 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-
 from pivoting.models.reading import ModelError, PlanarBody
 
 BODY, TABLE = "block", "table"  # names in the scenes

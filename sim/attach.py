@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
 from pivoting.controller.contacts import Contact
 from pivoting.controller.controller import WrenchController, world_wrench
 from pivoting.controller.laws import Body, Law

@@ -19,13 +19,14 @@ def cli() -> None:
 
 @cli.command()
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
-@click.option("--figure", type=click.Path(path_type=Path), help="Also draw the solution space, a .png, .svg or .pdf file.")
+@click.option(
+    "--figure", type=click.Path(path_type=Path), help="Also draw the solution space, a .png, .svg or .pdf file."
+)
 def example(as_json: bool, figure: Path | None) -> int:
     """Solve the notes' worked example by every method; exit 0 if all printed digits agree."""
-    from rich.console import Console
-
     from pivoting.controller.example import EXAMPLES, compare_all
     from pivoting.sim.report import jsonable, print_examples
+    from rich.console import Console
 
     if figure is not None:
         _check_figure(figure)
@@ -66,9 +67,8 @@ def example(as_json: bool, figure: Path | None) -> int:
 @cli.command("list")
 def list_scenarios() -> int:
     """The scenarios, a line each."""
-    from rich.console import Console
-
     from pivoting.sim.report import print_scenarios
+    from rich.console import Console
 
     print_scenarios(Console())
     return 0
@@ -78,7 +78,9 @@ def list_scenarios() -> int:
 @click.argument("scenario")
 @click.option("--worlds", type=click.IntRange(min=1), default=1, show_default=True, help="How many worlds.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the initial errors.")
-@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key, or world.KEY for the world alone.")
+@click.option(
+    "--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key, or world.KEY for the world alone."
+)
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for SCENARIO.rrd and summary.json.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object and nothing else.")
 def run(scenario: str, worlds: int, seed: int, settings: tuple[str, ...], out: Path | None, as_json: bool) -> int:
@@ -92,9 +94,8 @@ def run(scenario: str, worlds: int, seed: int, settings: tuple[str, ...], out: P
     with _progress(f"{scenario}, {worlds} world{'s' * (worlds > 1)}") as report:
         finished = simulate(case, worlds, seed, progress=report)
 
-    from rich.console import Console
-
     from pivoting.sim.report import jsonable, print_run
+    from rich.console import Console
 
     text = json.dumps(jsonable(finished.summary()), allow_nan=False, indent=None if as_json else 1)
     if not as_json:
@@ -107,7 +108,9 @@ def run(scenario: str, worlds: int, seed: int, settings: tuple[str, ...], out: P
         partial = out / ".summary.json.part"
         partial.write_text(json.dumps(jsonable(finished.summary()), allow_nan=False, indent=1) + "\n")
         partial.replace(out / "summary.json")
-        click.echo(f"wrote {out / 'summary.json'} and {recording} (world {world}); to see it: rerun {recording}", err=as_json)
+        click.echo(
+            f"wrote {out / 'summary.json'} and {recording} (world {world}); to see it: rerun {recording}", err=as_json
+        )
     if as_json:
         click.echo(text)
     return 1 if finished.verdict == "fail" else 0

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from pivoting.controller.solution_space import solution_space
 from pivoting.controller.solvers import Solution
 

@@ -2,13 +2,12 @@
 
 from collections.abc import Callable
 from time import perf_counter, perf_counter_ns
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
-
 from pivoting.controller.controller import Belief, WrenchController, step_worlds, world_wrench
 from pivoting.controller.space import Space
 from pivoting.controller.validate import fail
@@ -62,8 +61,11 @@ def simulate(
     steps = round(case.duration / dt)
     if steps < 2 or steps * worlds > MAX_STEPS:
         raise fail("seconds", case.duration, f"2 to {MAX_STEPS} steps in all worlds together, at dt = {dt:g} s")
-    time = dt * np.arange(steps + 1)
-    desired = tuple(np.asarray(values, dtype=float) for values in case.motion(time))
+    if steps * dt <= case.limits.settle_s:
+        raise fail("seconds", case.duration, f"more than the {case.limits.settle_s:g} s that the verdict lets settle")
+    time: Array = dt * np.arange(steps + 1, dtype=float)
+    angle, rate, acceleration = (np.asarray(values, dtype=float) for values in case.motion(time))
+    desired = angle, rate, acceleration
 
     batch = Batch(model, int(worlds), nthread=1 if worlds == 1 else 0, persistent=True)
     data = mujoco.MjData(model)
@@ -78,8 +80,7 @@ def simulate(
     start = perf_counter()
     log = _loop(batch, attached.controller.belief, attached.controller.space, truth, where, desired, progress)
     wall = perf_counter() - start
-    sensors, wrench, wrench_world, force, residual, status, control_ns = log
-    read = {key: sensors[..., columns] for key, columns in where.items()}
+    read = {key: log.sensors[..., columns] for key, columns in where.items()}
     table = matrix(truth.table)[:, [0, 2]]
     return Run(
         scenario=case,
@@ -90,18 +91,18 @@ def simulate(
         mu_world=read_friction(model, truth.index, truth.support),
         contact_rows=rows,
         time=time,
-        reference=desired,  # type: ignore[arg-type]
+        reference=desired,
         position=_worlds_first(read["position"]),
         quaternion=_worlds_first(read["quaternion"]),
         velocity=_worlds_first(read["velocity"]),
         angular_velocity=_worlds_first(read["angular_velocity"]),
-        wrench=_worlds_first(wrench),
-        wrench_world=_worlds_first(wrench_world),
-        force=_worlds_first(force).reshape(worlds, steps, 1, 2),
+        wrench=_worlds_first(log.wrench),
+        wrench_world=_worlds_first(log.wrench_world),
+        force=_worlds_first(log.force).reshape(worlds, steps, 1, 2),
         force_measured=_worlds_first(read["contact"][1:, :, 1:4] @ table).reshape(worlds, steps, 1, 2),
-        residual=_worlds_first(residual),
-        status=_worlds_first(status),
-        control_us=control_ns / (1e3 * worlds),
+        residual=_worlds_first(log.residual),
+        status=_worlds_first(log.status),
+        control_us=log.control_ns / (1e3 * worlds),
         wall_s=wall,
     )
 
@@ -124,7 +125,19 @@ def believe(case: Scenario, controller: WrenchController | None = None) -> Attac
     )
 
 
-def _worlds_first(values: Array) -> Array:
+class _Log(NamedTuple):
+    """What the loop keeps, time first: sensors (N+1, W, ...), everything else (N, W, ...), control_ns (N,)."""
+
+    sensors: Array
+    wrench: Array
+    wrench_world: Array
+    force: Array
+    residual: Array
+    status: NDArray[np.int8]
+    control_ns: Array
+
+
+def _worlds_first(values: NDArray[Any]) -> NDArray[Any]:
     """(step, world, ...) as the read-only view (world, step, ...)."""
     out = np.moveaxis(values, 1, 0)
     out.flags.writeable = False
@@ -137,10 +150,10 @@ def _loop(
     space: Space,
     truth: PlanarBody,
     where: dict[str, slice],
-    desired: tuple[Array, ...],
+    desired: tuple[Array, Array, Array],
     progress: Callable[[int, int], None] | None,
-) -> tuple[Array, ...]:
-    """Step all worlds to the end; the logs, time first: sensors (N+1), wrench, wrench_world, force, residual, status, ns."""
+) -> _Log:
+    """Step all worlds to the end."""
     steps, worlds = desired[0].size - 1, batch.nsim
     sensordata, xfrc = batch.bind("sensordata"), batch.bind("xfrc_applied")[:, truth.index]
     stage = int(mujoco.mjtStage.mjSTAGE_VEL)
@@ -148,12 +161,18 @@ def _loop(
     q, omega = sensordata[:, where["quaternion"]], sensordata[:, where["angular_velocity"]]
     q_d, omega_d, alpha_d = space.orientation(desired[0]), space.axial(desired[1]), space.axial(desired[2])
     nw, n = belief.wrench_map.shape[0], belief.Q_f.shape[0]
-    sensors = np.empty((steps + 1, *sensordata.shape))
-    wrench, wrench_world, force = np.empty((steps, worlds, nw)), np.empty((steps, worlds, 6)), np.empty((steps, worlds, n))
-    residual, status, spent = np.empty((steps, worlds)), np.empty((steps, worlds), np.int8), np.empty(steps)
+    log = _Log(
+        sensors=np.empty((steps + 1, *sensordata.shape)),
+        wrench=np.empty((steps, worlds, nw)),
+        wrench_world=np.empty((steps, worlds, 6)),
+        force=np.empty((steps, worlds, n)),
+        residual=np.empty((steps, worlds)),
+        status=np.empty((steps, worlds), np.int8),
+        control_ns=np.empty(steps),
+    )
+    sensors, wrench, wrench_world, force, residual, status, spent = log
     answers = (wrench[0], force[0], residual[0], status[0])
     step_worlds(belief, TOLERANCE, q, omega, q_d[0], omega_d[0], alpha_d[0], *answers)  # compiled before it is timed
-    world_wrench(belief.wrench_map, q, wrench[0], wrench_world[0])
     sensors[0] = sensordata
     report = max(1, steps // 100)
     for k in range(steps):
@@ -168,4 +187,4 @@ def _loop(
         sensors[k + 1] = sensordata
         if progress is not None and (k + 1) % report == 0:
             progress(k + 1, steps)
-    return sensors, wrench, wrench_world, force, residual, status, spent
+    return log

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-
 from pivoting.sim.fidelity import drift
 
 if TYPE_CHECKING:
@@ -46,9 +45,9 @@ def measure(run: "Run") -> Measures:
     error = np.rad2deg(run.angle_error[:, settled])
     steps = settled[:-1]
     measured, predicted = run.force_measured[:, steps, 0], run.force[:, steps, 0]
-    pushed = measured[..., 1] > 0.0
+    use = run.friction_use[:, steps]
+    pushed = ~np.isnan(use)
     with np.errstate(invalid="ignore", divide="ignore"):
-        use = np.abs(measured[..., 0]) / (run.mu_world * measured[..., 1])
         mismatch = _rms(np.linalg.norm(measured - predicted, axis=-1)) / _rms(np.linalg.norm(predicted, axis=-1))
     return Measures(
         slip_max_m=np.abs(run.slip).max(axis=1),

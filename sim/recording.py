@@ -1,30 +1,29 @@
-"""A finished run as a rerun recording: the scene with its forces, the wrench space and the time series.
+"""A finished run as a rerun recording: the scene with its forces, the wrench space, the time series and the verdict.
 
 Nothing is recorded while the loop runs: `record` reads the arrays of a `Run` and sends whole columns. Entities:
 
-    /world/table, /world/block          the solids, posed by transforms (rerun's quaternions are xyzw, MuJoCo's wxyz)
-    /world/path/{corner,com}            where the material corner and the CoM went
-    /world/wrench/{force,moment,weight} applied wrench w and weight at the CoM, world axes
-    /world/contact/{predicted,measured} contact forces at the corner, table axes, with the cones and the floor f_min
-    /wrench_space/...                   the notes' second figure, object axes (F_u, F_v, M / length)
-    /plots/<plot>/<series>              the series of `_series`
-    /plots/solve_us                     the only entity with wall-clock time: all else is equal when runs are equal
-    /report                             verdict and checks
+    /world/table, /world/block            the solids, posed by transforms
+    /world/path/{corner,com}              where the material corner and the CoM went
+    /world/wrench/{force,moment,weight}   applied wrench w and weight at the CoM, world axes
+    /world/contact/{predicted,measured}   contact forces f at the corner, table axes
+    /world/contact/cone/{planned,world}   (1 - margin) mu with the floor f_min, and the mu of the world
+    /wrench_space/...                     the notes' second figure, object axes
+    /plots/<plot>/<series>                those of `_series`
+    /plots/solve_us                       the only entity that holds wall-clock time
+    /report                               verdict and checks
 
-Arrows are drawn in front of the block's front face, at a scale that is constant over the run (`_Drawing.scale`).
+What is not finite is left out: a gap in a plot, nothing in a view.
 """
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from math import ceil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
+from numpy.typing import NDArray
 from pivoting.controller.solution_space import SolutionSpace, solution_space
 from pivoting.controller.solvers import Solution, solve
 from pivoting.controller.space import Motion
@@ -35,77 +34,113 @@ from pivoting.sim.run import Run
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
-Colour = tuple[int, ...]
+Colour = tuple[int, int, int]
 
-FAR = 1e6  # [m, m/s, rad/s]: a state beyond it has diverged, and the recording stops before it
-SCENE, SPACE, PLOTS = (200.0, 2_000), (50.0, 500), (np.inf, 20_000)  # at most [Hz of simulated time, rows]
-DEPTH = 0.4  # of the block that is drawn, in sides; the plane knows none
-GREEN, LIME, TEAL = (60, 190, 90), (170, 220, 90), (60, 200, 200)  # the applied wrench: F_u or all of it, F_v, M
-ORANGE, YELLOW = (255, 150, 40), (250, 215, 90)  # the predicted contact force: normal or all of it, tangential
-RED, PINK = (225, 60, 70), (250, 150, 170)  # the measured one, likewise
-PURPLE, GREY, WHITE = (165, 130, 235), (170, 170, 170), (235, 235, 235)  # the planned cone, the world's, axes
+SCENE, SPACE, PLOTS = (200.0, 2_000), (50.0, 500), (np.inf, 20_000)  # at most [Hz of simulated time], at most rows
+FAR = 1e6  # [m, m/s, rad/s]: a state beyond it has diverged
+HUGE = 1e30  # beyond it single precision, which views are kept in, ends
+DEPTH = 0.4  # of the drawn block, in sides: the plane knows none
 QUAD = [[0, 1, 2], [0, 2, 3]]  # triangles of four corners
-FINE, WIDE = 1.5, 4.0  # lines of the plots: measured under predicted
+UP = np.array([0.0, 0.0, 1.0])
+FINE, WIDE = 1.5, 4.0  # line widths: what was measured shows under what was predicted
+GREEN, LIME, TEAL = (60, 190, 90), (170, 220, 90), (60, 200, 200)  # applied wrench: all or F_u, F_v, M
+ORANGE, YELLOW = (255, 150, 40), (250, 215, 90)  # predicted contact force: all or f_n, f_t
+RED, PINK = (225, 60, 70), (250, 150, 170)  # measured, likewise
+PURPLE, GREY, WHITE = (165, 130, 235), (170, 170, 170), (235, 235, 235)  # planned cone; the world's, weight; the rest
+BLOCK, EDGES, TABLE, DARK = (70, 105, 145), (150, 185, 225), (120, 112, 100), (24, 26, 30)
+TITLES = {  # plot -> title, where the legend is
+    "angle": ("angle [deg]", "LeftTop"),
+    "slip": ("slip of the corner [mm]", "LeftTop"),
+    "friction_use": ("friction use |f_t| / (mu f_n)", "RightBottom"),
+    "force": ("contact force [N]", "RightTop"),
+    "wrench": ("applied wrench [N, N m]", "RightTop"),
+    "solve_us": ("time to solve [us]", "RightTop"),
+}
 
 
 def record(run: Run, path: Path, *, world: int = 0) -> Path:
-    """Write one world of a finished planar run to `path` (.rrd) and return it; open it with `rerun FILE`.
+    """Write one world of a finished planar run to `path` (.rrd) and return it; `rerun PATH` shows it.
 
-    The scene is kept at 200 Hz of simulated time or less and 2,000 frames at most, the wrench space at 50 Hz and 500, the
-    plots at every step up to 20,000 rows, then at every second, third... A world that diverges is recorded up to there.
-    Runs that are equal give files that `rerun rrd compare --unordered` calls equal, but for /plots/solve_us.
+    Views hold 200 Hz of simulated time at most, and 2,000 frames at most; the wrench space 50 Hz and 500, solved again
+    for the occasion; plots every step up to 20,000 rows, and then every second, third... The last is always kept.
+    A world that diverges is recorded up to there. Equal runs give files that `rerun rrd compare --unordered` calls
+    equal, but for /plots/solve_us.
 
     Args:
         run: of `simulate`.
-        path: of the file; it appears when it is whole. Its folder exists.
+        path: of the file, in a folder that exists. It appears, or is replaced, when it is whole.
         world: which one.
 
     Raises:
         ValueError: there is no such world.
+        OSError: the file cannot be written.
     """
     if isinstance(world, bool) or not isinstance(world, int | np.integer) or not 0 <= world < run.worlds:
         raise fail("world", world, f"a whole number in [0, {run.worlds})")
-    import rerun as rr
+    import rerun as rr  # takes a second
 
-    path = Path(path)
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    drawing = _Drawing(run, int(world))
-    with _strict():
-        name = f"{run.scenario.name}-seed{run.seed}-world{world}"
-        stream = rr.RecordingStream("pivoting", recording_id=name, send_properties=False)
-        try:
-            stream.save(partial, default_blueprint=_blueprint(drawing))
-            for send in (_scene, _forces, _wrench_space, _plots):
-                send(drawing, stream)
-            stream.log("report", rr.TextDocument(_report(drawing), media_type="text/markdown"), static=True)
-            stream.flush()
-            stream.disconnect()
-            partial.replace(path)
-        finally:
-            stream.disconnect()
-            partial.unlink(missing_ok=True)
+    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    strict = rr.strict_mode()
+    rr.set_strict_mode(True)  # it raises where it would only warn
+    try:
+        partial.write_bytes(_encoded(run, int(world), rr))
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+        rr.set_strict_mode(strict)
     return path
 
 
-@contextmanager
-def _strict() -> Iterator[None]:
-    """rerun raises what it would else only warn of."""
-    import rerun as rr
-
-    before = rr.strict_mode()
-    rr.set_strict_mode(True)
-    try:
-        yield
-    finally:
-        rr.set_strict_mode(before)
+@np.errstate(over="ignore", invalid="ignore")  # of what diverges: `_Film.send` leaves it out
+def _encoded(run: Run, world: int, rr: Any) -> bytes:
+    """The file, made in memory: rerun's own file sink can hang on a full disk."""
+    name = f"{run.scenario.name}-seed{run.seed}-world{world}"  # fixed, and without properties: files can be compared
+    stream = rr.RecordingStream("pivoting", recording_id=name, send_properties=False)
+    memory = stream.memory_recording()
+    film = _Film(run, world, rr, stream)
+    stream.send_blueprint(_blueprint(film), make_active=False, make_default=True)
+    film.still("report", rr.TextDocument(_report(film), media_type="text/markdown"))
+    for send in (_solids, _wrench, _contact, _wrench_space, _plots):
+        send(film)
+    return memory.drain_as_bytes()
 
 
 @dataclass(frozen=True, eq=False)
-class _Drawing:
-    """One world of a run up to where it is finite, and the sizes it is drawn with."""
+class _Film:
+    """One world of a run up to where it diverges, the sizes it is drawn with, and the recording it is sent to."""
 
     run: Run
     world: int
+    rr: Any  # the module
+    stream: Any
+
+    def still(self, entity: str, *archetypes: Any) -> None:
+        """Send what does not change."""
+        for archetype in archetypes:
+            self.stream.log(entity, archetype, static=True)
+
+    def send(self, entity: str, rows: Rows, archetype: Any, *, each: int = 1, **values: Array) -> None:
+        """Send columns `values` (R each, ...) of an archetype that has `each` instances at each of the R `rows`."""
+        drawn = [np.abs(value.reshape(rows.size, -1)) < HUGE for value in values.values()]
+        there = np.all(np.hstack(drawn), axis=1)
+        columns = archetype.columns(**{key: value[np.repeat(there, each)] for key, value in values.items()})
+        seconds = self.rr.TimeColumn("sim_time", duration=self.run.time[rows])
+        steps = self.rr.TimeColumn("step", sequence=rows)
+        self.stream.send_columns(entity, [seconds, steps], columns.partition(each * there))
+
+    def arrows(
+        self, entity: str, rows: Rows, vectors: Array, colour: Colour, width: float, label: str, at: float = 1.0
+    ) -> None:
+        """Send arrows (R, 3) from the entity's origin, with a label just past the share `at` of their length."""
+        self.still(entity, self.rr.Arrows3D.from_fields(colors=[colour], radii=[width]), self.label(label, colour))
+        self.send(entity, rows, self.rr.Arrows3D, vectors=vectors)
+        past = at + 4.0 * width / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), width)
+        self.send(entity, rows, self.rr.Points3D, positions=vectors * past)
+
+    def label(self, text: str, colour: Colour, at: Array | None = None) -> Any:
+        """A word at the position `at` (3,), or else at positions that are sent as a column."""
+        style = {"labels": [text], "colors": [colour], "radii": [0.0], "show_labels": bool(text)}
+        return self.rr.Points3D.from_fields(positions=None if at is None else [at], **style)
 
     @cached_property
     def states(self) -> int:
@@ -113,7 +148,7 @@ class _Drawing:
         run, i = self.run, self.world
         state = np.hstack([run.position[i], run.quaternion[i], run.velocity[i], run.angular_velocity[i]])
         wrong = ~(np.abs(state) <= FAR).all(axis=1)
-        return int(wrong.argmax()) if wrong.any() else len(wrong)
+        return int(wrong.argmax()) if wrong.any() else wrong.size
 
     @property
     def answers(self) -> int:
@@ -121,10 +156,10 @@ class _Drawing:
         return min(self.states, self.run.time.size - 1)
 
     def rows(self, count: int, budget: tuple[float, int]) -> Rows:
-        """Which of `count` steps are kept within a budget (Hz of simulated time, rows); the last one always."""
+        """Which of `count` rows are kept within a budget (Hz of simulated time, rows)."""
         rate, most = budget
-        stride = max(1, round(1.0 / (rate * self.run.dt)), -(-count // (most - 1)))
-        return np.unique(np.append(np.arange(0, count, stride), count - 1))
+        stride = max(1, ceil(1.0 / (rate * self.run.dt) - 1e-9), ceil(count / (most - 1)))
+        return np.union1d(np.arange(0, count, stride), np.arange(count)[-1:])
 
     @cached_property
     def side(self) -> float:
@@ -132,42 +167,26 @@ class _Drawing:
         return 2.0 * float(np.abs(self.run.corner_point).max())
 
     @cached_property
-    def weight(self) -> Array:
-        """(3,) m g, world axes [N]."""
-        return self.run.truth.mass * self.run.truth.gravity
-
-    @cached_property
-    def load(self) -> float:
-        """Force [N] that is drawn half a side long: m g, or if the run's forces (95 % of them) exceed 2.5 m g, more."""
-        forces = [self.applied[:, :3], self.run.force[self.world, : self.answers, 0]]
-        largest = max(float(np.nanquantile(np.linalg.norm(force, axis=1), 0.95)) for force in forces)
-        return max(float(np.linalg.norm(self.weight)), 0.4 * largest, np.finfo(float).tiny)
-
-    @property
     def scale(self) -> float:
-        """Length of a drawn force [m/N]."""
-        return 0.5 * self.side / self.load
+        """Length of a drawn force [m/N]: m g is half a side, or less if the run's forces would pass 1.25 sides."""
+        forces = self.run.wrench[self.world, :, :2], self.run.force[self.world, :, 0]
+        largest = max(_usual(np.linalg.norm(force[: self.answers], axis=1)) for force in forces)
+        return 0.5 * self.side / max(float(np.linalg.norm(self.weight)), 0.4 * largest, 1e-9)
 
     @property
-    def applied(self) -> Array:
-        """(answers, 6) applied wrench, world axes."""
-        return self.run.wrench_world[self.world, : self.answers]
-
-    @property
-    def table(self) -> Array:
-        """(3, 3) tangent, into the picture, normal as columns, world axes."""
-        return matrix(self.run.truth.table)
+    def away(self) -> Array:
+        """(3,) the unit vector into the picture, world axes."""
+        return matrix(self.run.truth.table)[:, 1]
 
     @property
     def front(self) -> Array:
-        """(3,) from the plane of motion to the one that arrows are drawn in [m]."""
-        return -self.table[:, 1] * (0.5 * DEPTH + 0.02) * self.side
+        """(3,) from the plane of motion to the one before the block that arrows are drawn in [m]."""
+        return -self.away * (0.5 * DEPTH + 0.02) * self.side
 
     @property
-    def corner(self) -> Array:
-        """(states, 3) the material corner, world axes [m]."""
-        corner = self.run.corner[self.world, : self.states]
-        return self.run.truth.origin + corner @ self.run.table_axes.T
+    def weight(self) -> Array:
+        """(3,) m g, world axes [N]."""
+        return self.run.truth.mass * self.run.truth.gravity
 
     @property
     def planned_mu(self) -> float:
@@ -175,340 +194,207 @@ class _Drawing:
         return float(self.run.attached.controller.belief.mu[0])
 
     @cached_property
-    def length(self) -> float:
-        """The moment M is drawn in wrench space as M / length [m]: then Q_w weighs all axes of the picture alike."""
-        Q_w = self.run.attached.controller.Q_w
-        return float(np.sqrt(Q_w[0, 0] / Q_w[2, 2]))
+    def corner(self) -> Array:
+        """(states, 3) the material corner, world axes [m]."""
+        return self.run.truth.origin + self.run.corner[self.world, : self.states] @ self.run.table_axes.T
 
     @cached_property
-    def solution_rows(self) -> Rows:
-        """The answered steps whose wrench space is drawn."""
-        rows = self.rows(self.answers, SPACE)
-        return rows[self.run.status[self.world, rows] == 0]
-
-    @cached_property
-    def solutions(self) -> list[Solution]:
-        """The problem of each of `solution_rows`, stated and solved again."""
-        run, i, controller = self.run, self.world, self.run.attached.controller
-        theta, omega = run.theta[i], run.omega[i]
-        return [
-            solve(controller.problem(Motion(theta[k], omega[k]), Motion(*(values[k] for values in run.reference))))
-            for k in self.solution_rows
-        ]
+    def solutions(self) -> dict[int, Solution]:
+        """Step -> its problem, stated and solved again, for the answered steps whose wrench space is drawn."""
+        run, i, problem = self.run, self.world, self.run.attached.controller.problem
+        theta, omega, wanted = run.theta[i], run.omega[i], np.transpose(run.reference)
+        rows = [k for k in self.rows(self.answers, SPACE) if run.status[i, k] == 0]
+        return {k: solve(problem(Motion(theta[k], omega[k]), Motion(*wanted[k]))) for k in rows}
 
     @cached_property
     def reach(self) -> float:
-        """Largest normal force in the picture of the wrench space, and half its size [N]."""
-        sizes = [max(np.linalg.norm(each.problem.required[:2]), each.force[0, 1]) for each in self.solutions]
-        return 1.25 * float(max(sizes, default=self.load))
+        """Largest normal force in the picture of the wrench space, and half the picture's size [N]."""
+        sizes = [max(np.linalg.norm(each.problem.required[:2]), each.force[0, 1]) for each in self.solutions.values()]
+        return 1.25 * float(max(sizes, default=1.0))
 
 
-def _send(drawing: _Drawing, stream: Any, entity: str, rows: Rows, columns: Any) -> None:
-    """Send columns, one entry for each of `rows`, on both timelines."""
-    import rerun as rr
-
-    times = drawing.run.time[rows]
-    stream.send_columns(entity, [rr.TimeColumn("sim_time", duration=times), rr.TimeColumn("step", sequence=rows)], columns)
+def _usual(values: Array) -> float:
+    """What 95 % of the magnitudes that are finite stay below; 0 if none is."""
+    finite = np.abs(values[np.isfinite(values)])
+    return float(np.quantile(finite, 0.95)) if finite.size else 0.0
 
 
 def _xyzw(quaternion: Array) -> Array:
-    """rerun's order (..., 4) of quaternions (w, x, y, z)."""
+    """(..., 4) in rerun's order, from MuJoCo's (w, x, y, z)."""
     return np.roll(quaternion, -1, axis=-1)
 
 
-def _scene(drawing: _Drawing, stream: Any) -> None:
+def _solids(film: _Film) -> None:
     """Table, block, and the paths of its corner and CoM."""
-    import rerun as rr
-
-    run, side = drawing.run, drawing.side
-    u, v = np.abs(run.corner_point)
-    stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    rr, run, side = film.rr, film.run, film.side
+    thin = rr.Radius.ui_points(1.0)
+    film.still("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    slab = side * np.array([2.0, 0.5, 0.03])
     pose = rr.Transform3D(translation=run.truth.origin, quaternion=_xyzw(run.truth.table))
-    slab = np.array([2.0, 0.5, 0.03]) * side
-    stream.log("world/table", pose, static=True)
-    stream.log(
-        "world/table/slab",
-        rr.Boxes3D(centers=[[0, 0, -slab[2]]], half_sizes=[slab], colors=[(120, 112, 100)], fill_mode="solid"),
-        static=True,
-    )
-    box = {"half_sizes": [[u, 0.5 * DEPTH * side, v]], "radii": rr.Radius.ui_points(1.0)}
-    stream.log("world/block/solid", rr.Boxes3D(**box, colors=[(70, 105, 145)], fill_mode="solid"), static=True)
-    stream.log("world/block/edges", rr.Boxes3D(**box, colors=[(150, 185, 225)]), static=True)
-    rows = drawing.rows(drawing.states, SCENE)
-    position, quaternion = run.position[drawing.world, rows], run.quaternion[drawing.world, rows]
-    columns = rr.Transform3D.columns(translation=position, quaternion=_xyzw(quaternion))
-    _send(drawing, stream, "world/block", rows, columns)
-    for name, points, colour in (("com", position, GREY), ("corner", drawing.corner[rows], WHITE)):
-        line = rr.LineStrips3D([points + drawing.front], colors=[colour], radii=rr.Radius.ui_points(1.5))
-        stream.log(f"world/path/{name}", line, static=True)
+    top = rr.Boxes3D(centers=[-slab * UP], half_sizes=[slab], colors=[TABLE], fill_mode="solid")
+    film.still("world/table", pose, top)
+    half = np.insert(np.abs(run.corner_point), 1, 0.5 * DEPTH * side)
+    film.still("world/block/solid", rr.Boxes3D(half_sizes=[half], colors=[BLOCK], fill_mode="solid"))
+    film.still("world/block/edges", rr.Boxes3D(half_sizes=[half], colors=[EDGES], radii=thin))
+    rows = film.rows(film.states, SCENE)
+    position, quaternion = run.position[film.world, rows], run.quaternion[film.world, rows]
+    film.send("world/block", rows, rr.Transform3D, translation=position, quaternion=_xyzw(quaternion))
+    for name, points in (("com", position), ("corner", film.corner[rows])):
+        film.still(f"world/path/{name}", rr.LineStrips3D([points + film.front], colors=[GREY], radii=thin))
 
 
-def _forces(drawing: _Drawing, stream: Any) -> None:
-    """Weight and applied wrench at the CoM, contact forces and friction cones at the corner."""
-    import rerun as rr
-
-    run, i, scale = drawing.run, drawing.world, drawing.scale
-
-    rows = drawing.rows(drawing.answers, SCENE)
-    com = run.position[i, rows] + drawing.front
-    _send(drawing, stream, "world/wrench", rows, rr.Transform3D.columns(translation=com))
-    moment = rr.LineStrips3D.from_fields(colors=[TEAL], radii=[0.012 * drawing.side])
-    stream.log("world/wrench/moment", moment, static=True)
-    _send(drawing, stream, "world/wrench/moment", rows, rr.LineStrips3D.columns(strips=_arcs(drawing, rows)))
-    _label(stream, "world/wrench/moment", -0.42 * drawing.side * drawing.table[:, 0], TEAL, "w: moment")
-    applied, weight = drawing.applied[rows, :3], np.tile(drawing.weight, (rows.size, 1))
-    _arrows(drawing, stream, "world/wrench/force", rows, applied * scale, GREEN, 0.02 * drawing.side, "w: force")
-    _arrows(drawing, stream, "world/wrench/weight", rows, weight * scale, GREY, 0.012 * drawing.side, "")
-    _label(stream, "world/wrench/weight", 0.5 * drawing.weight * scale + 0.1 * drawing.side * drawing.table[:, 0], GREY, "m g")
-
-    frame = rr.Transform3D.columns(
-        translation=drawing.corner[rows] + drawing.front,
-        quaternion=np.tile(_xyzw(run.truth.table), (rows.size, 1)),
-    )
-    _send(drawing, stream, "world/contact", rows, frame)
-    for name, force, colour, width, text in (
-        ("measured", run.force_measured, RED, 0.03, ""),
-        ("predicted", run.force, ORANGE, 0.015, "f"),
-    ):
-        drawn = np.nan_to_num(_lift(force[i, rows, 0])) * scale
-        _arrows(drawing, stream, f"world/contact/{name}", rows, drawn, colour, width * drawing.side, text)
-    problem = run.attached.controller.contacts[0]
-    reach = max(0.8 * drawing.side, 1.3 * problem.f_min * scale)
-    for name, mu, colour, at, text in (
-        ("world", run.mu_world, GREY, 0, "world's mu"),
-        ("planned", drawing.planned_mu, PURPLE, 1, "planned"),
-    ):
-        sides = _lift(np.array([[-mu, 1.0], [mu, 1.0]]))
-        floor, top = scale * problem.f_min * sides, reach / np.hypot(mu, 1.0) * sides
-        entity = f"world/contact/cone/{name}"
-        strips = [[top[0], np.zeros(3), top[1]], *([floor] if name == "planned" else [])]
-        lines = rr.LineStrips3D(strips, colors=[colour] * len(strips), radii=rr.Radius.ui_points(1.0))
-        stream.log(entity, lines, static=True)
-        _label(stream, entity, 1.06 * top[at], colour, text)
-        if name == "planned":
-            corners = np.vstack([floor, top[::-1]])
-            fill = rr.Mesh3D(vertex_positions=corners, triangle_indices=QUAD, albedo_factor=(*colour, 60))
-            stream.log(entity, fill, static=True)
+def _wrench(film: _Film) -> None:
+    """At the CoM: the weight, and the applied wrench as an arrow and an arc."""
+    rr, run, side = film.rr, film.run, film.side
+    rows = film.rows(film.answers, SCENE)
+    applied, weight = run.wrench_world[film.world, rows, :3] * film.scale, film.weight * film.scale
+    right = np.cross(film.away, UP)
+    film.send("world/wrench", rows, rr.Transform3D, translation=run.position[film.world, rows] + film.front)
+    arrow = rr.Arrows3D(vectors=[weight], colors=[GREY], radii=[0.012 * side])
+    film.still("world/wrench/weight", arrow, film.label("m g", GREY, 0.5 * weight + 0.1 * side * right))
+    arc = rr.LineStrips3D.from_fields(colors=[TEAL], radii=[0.012 * side])
+    film.still("world/wrench/moment", arc, film.label("w: moment", TEAL, -0.42 * side * right))
+    film.send("world/wrench/moment", rows, rr.LineStrips3D, strips=_arcs(film, rows))
+    film.arrows("world/wrench/force", rows, applied, GREEN, 0.02 * side, "w: force")
 
 
-def _label(stream: Any, entity: str, at: Array, colour: Colour, text: str) -> None:
-    """A word that stays where it is in the entity's frame."""
-    import rerun as rr
-
-    stream.log(entity, rr.Points3D([at], labels=[text], colors=[colour], radii=0.0, show_labels=True), static=True)
-
-
-def _arrows(
-    drawing: _Drawing, stream: Any, entity: str, rows: Rows, vectors: Array, colour: Colour, width: float, label: str
-) -> None:
-    """Send arrows from the entity's origin, (R, 3) and `width` in the view's unit, with a label just past the tip."""
-    import rerun as rr
-
-    style = rr.Arrows3D.from_fields(colors=[colour], radii=[width])
-    stream.log(entity, style, static=True)
-    columns = [*rr.Arrows3D.columns(vectors=vectors)]
-    if label:
-        stream.log(entity, rr.Points3D.from_fields(colors=[colour], radii=[0.0], labels=[label]), static=True)
-        length = np.linalg.norm(vectors, axis=1, keepdims=True)
-        past = vectors * (1.0 + 4.0 * width / np.maximum(length, width))
-        columns += rr.Points3D.columns(positions=past)
-    _send(drawing, stream, entity, rows, columns)
-
-
-def _lift(planar: Array) -> Array:
-    """(..., 3) of (..., 2) table coordinates: nothing along the plane's normal."""
-    return np.insert(planar, 1, 0.0, axis=-1)
-
-
-def _arcs(drawing: _Drawing, rows: Rows) -> Array:
+def _arcs(film: _Film, rows: Rows) -> Array:
     """(R, 28, 3) the applied moment as an arc about the CoM with an arrow head, counter-clockwise if positive [m].
 
-    270 deg are the run's moments (95 % of them), or a tenth of the load at the contact's lever if that is more.
+    270 deg stand for what the run's moments usually stay below, or for a tenth of m g at the corner's lever if more.
     """
-    run = drawing.run
-    moment = drawing.applied[:, 3:] @ run.attached.controller.space.axial(1.0)
-    lever = float(np.linalg.norm(run.corner_point))
-    full = max(float(np.quantile(np.abs(moment), 0.95)), 0.1 * drawing.load * lever)
-    sweep = np.deg2rad(np.clip(270.0 * moment[rows] / full, -330.0, 330.0))
-    start = 0.25 * np.pi
-    angle = start + sweep[:, None] * np.linspace(0.0, 1.0, 25)
-    radius = np.full(angle.shape, 0.2)
-    back = np.sign(sweep) * np.minimum(0.35, np.abs(sweep))
-    barbs = angle[:, -1] - back
-    angle = np.column_stack([angle, barbs, angle[:, -1], barbs])
-    radius = np.column_stack([radius, np.full(rows.size, 0.25), radius[:, -1], np.full(rows.size, 0.15)])
-    return drawing.side * radius[..., None] * (
-        np.cos(angle)[..., None] * drawing.table[:, 0] + np.sin(angle)[..., None] * drawing.table[:, 2]
-    )
+    moment = film.run.wrench[film.world, : film.answers, 2]
+    full = max(_usual(moment), 0.05 * film.side / film.scale * float(np.linalg.norm(film.run.corner_point)))
+    sweep = np.deg2rad(np.clip(270.0 * moment[rows, None] / full, -330.0, 330.0))
+    shaft = 0.25 * np.pi + sweep * np.linspace(0.0, 1.0, 25)
+    tip = shaft[:, -1:]
+    barb = tip - np.sign(sweep) * np.minimum(0.35, np.abs(sweep))
+    angle, radius = np.hstack([shaft, barb, tip, barb]), film.side * np.array([0.2] * 25 + [0.25, 0.2, 0.15])
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1) @ film.run.table_axes.T
 
 
-def _wrench_space(drawing: _Drawing, stream: Any) -> None:
-    """The notes' second figure over time: cone {J f}, balancing set, required, and the optimum w + J f = required."""
-    import rerun as rr
+def _contact(film: _Film) -> None:
+    """At the corner, in the table's frame: contact forces, and the friction cones that they have to be in."""
+    rr, run, side = film.rr, film.run, film.side
+    rows = film.rows(film.answers, SCENE)
+    pose = np.tile(_xyzw(run.truth.table), (rows.size, 1))
+    film.send("world/contact", rows, rr.Transform3D, translation=film.corner[rows] + film.front, quaternion=pose)
+    lift = run.attached.controller.space.lift
+    measured, predicted = (film.scale * lift(f[film.world, rows, 0]) for f in (run.force_measured, run.force))
+    film.arrows("world/contact/measured", rows, measured, RED, 0.03 * side, "")
+    film.arrows("world/contact/predicted", rows, predicted, ORANGE, 0.015 * side, "f")
+    film.still("world/contact/predicted", rr.Arrows3D.from_fields(origins=[[0.0, -0.04 * side, 0.0]]))
+    floor = film.scale * run.attached.controller.contacts[0].f_min
+    for name, mu, colour, at in (("world", run.mu_world, GREY, -0.35), ("planned", film.planned_mu, PURPLE, 0.35)):
+        entity = f"world/contact/cone/{name}"
+        edges = lift(np.array([[-mu, 1.0], [mu, 1.0]]))
+        top = edges * max(0.8 * side / np.hypot(mu, 1.0), 1.3 * floor)
+        lines = [[top[0], np.zeros(3), top[1]], edges * (floor if name == "planned" else 0.0)]
+        film.still(entity, rr.LineStrips3D(lines, colors=[colour] * 2, radii=rr.Radius.ui_points(1.0)))
+        if name == "planned":
+            corners = np.vstack([edges * floor, top[::-1]])
+            film.still(entity, rr.Mesh3D(vertex_positions=corners, triangle_indices=QUAD, albedo_factor=(*colour, 60)))
+        film.still(entity, film.label(f"cone, {name}", colour, side * np.array([at, 0.0, -0.05])))
 
-    rows, units = drawing.solution_rows, np.array([1.0, 1.0, 1.0 / drawing.length])
-    spaces = [solution_space(solution, drawing.reach) for solution in drawing.solutions]
-    if not spaces:
+
+def _wrench_space(film: _Film) -> None:
+    """The notes' second figure over time: contact cone {J f}, admissible w, and the optimum, w + J f = required.
+
+    Moments are drawn as M / length, with the length [m] that makes Q_w weigh all axes of the picture alike.
+    """
+    if not film.solutions:
         return
-    names = ("F_u [N]", "F_v [N]", f"M / {drawing.length:.3g} m [N]")
-    size = drawing.reach
-    axes = 0.8 * size * np.eye(3)
-    stream.log("wrench_space", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    thin = rr.Radius.ui_points(1.0)
-    arrows = rr.Arrows3D(vectors=2.0 * axes, origins=-axes, colors=[GREY] * 3, radii=0.008 * size)
-    stream.log("wrench_space/axes", arrows, static=True)
-    ends = rr.Points3D(axes, labels=names, colors=[WHITE] * 3, radii=rr.Radius.ui_points(0.5), show_labels=True)
-    stream.log("wrench_space/axes/names", ends, static=True)
-
-    stacked = SolutionSpace(*(np.array(parts) * units for parts in zip(*spaces, strict=True)))
-    for name, polygon, colour, label in (
-        ("cone", stacked.cone, ORANGE, "contact cone"),
-        ("admissible", stacked.admissible, GREEN, "admissible w"),
-    ):
-        entity = f"wrench_space/{name}"
-        fill = rr.Mesh3D.from_fields(triangle_indices=QUAD, albedo_factor=(*colour, 90))
-        stream.log(f"{entity}/fill", fill, static=True)
-        lengths = np.full(rows.size, polygon.shape[1])
-        corners = rr.Mesh3D.columns(vertex_positions=polygon.reshape(-1, 3)).partition(lengths)
-        _send(drawing, stream, f"{entity}/fill", rows, corners)
-        stream.log(f"{entity}/edge", rr.LineStrips3D.from_fields(colors=[colour], radii=[thin]), static=True)
-        closed = np.concatenate([polygon, polygon[:, :1]], axis=1)
-        _send(drawing, stream, f"{entity}/edge", rows, rr.LineStrips3D.columns(strips=closed))
-        word = rr.Points3D.from_fields(colors=[colour], radii=[0.0], labels=[label], show_labels=True)
-        stream.log(f"{entity}/name", word, static=True)
-        _send(drawing, stream, f"{entity}/name", rows, rr.Points3D.columns(positions=polygon[:, 1:3].mean(axis=1)))
-    for name, vector, colour, label in (
-        ("required", stacked.required, WHITE, "required"),
-        ("wrench", stacked.wrench, GREEN, "w"),
-        ("contact", stacked.contact, ORANGE, "J f"),
-    ):
-        entity = f"wrench_space/{name}"
-        _arrows(drawing, stream, entity, rows, vector, colour, 0.02 * size, label)
-    sides = np.stack([stacked.wrench, stacked.required, stacked.contact], axis=1)
-    stream.log("wrench_space/sum", rr.LineStrips3D.from_fields(colors=[GREY], radii=[thin]), static=True)
-    _send(drawing, stream, "wrench_space/sum", rows, rr.LineStrips3D.columns(strips=sides))
+    rr, rows, size = film.rr, np.array(list(film.solutions)), film.reach
+    Q_w, thin, axes = film.run.attached.controller.Q_w, rr.Radius.ui_points(1.0), 0.8 * size * np.eye(3)
+    length = float(np.sqrt(Q_w[0, 0] / Q_w[2, 2]))
+    film.still("wrench_space", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    film.still("wrench_space/axes", rr.Arrows3D(vectors=2.0 * axes, origins=-axes, colors=[GREY], radii=0.006 * size))
+    for name, unit, axis in zip(("F_u", "F_v", "M"), ("", "", f" / {length:.3g} m"), axes, strict=True):
+        film.still(f"wrench_space/axes/{name}", film.label(f"{name}{unit} [N]", WHITE, 1.1 * axis))
+    spaces = [solution_space(solution, size) for solution in film.solutions.values()]
+    over_time = SolutionSpace(*(np.array(parts) / [1.0, 1.0, length] for parts in zip(*spaces, strict=True)))
+    for name, polygon, colour in (("cone", over_time.cone, ORANGE), ("admissible", over_time.admissible, GREEN)):
+        fill, edge = f"wrench_space/{name}/fill", f"wrench_space/{name}/edge"
+        film.still(fill, rr.Mesh3D.from_fields(triangle_indices=QUAD, albedo_factor=(*colour, 90)))
+        film.send(fill, rows, rr.Mesh3D, each=polygon.shape[1], vertex_positions=polygon.reshape(-1, 3))
+        film.still(edge, rr.LineStrips3D.from_fields(colors=[colour], radii=[thin]), film.label(name, colour))
+        film.send(edge, rows, rr.LineStrips3D, strips=polygon[:, [0, 1, 2, 3, 0]])
+        film.send(edge, rows, rr.Points3D, positions=polygon[:, 1:3].mean(axis=1))
+    film.arrows("wrench_space/required", rows, over_time.required, WHITE, 0.02 * size, "required")
+    film.arrows("wrench_space/wrench", rows, over_time.wrench, GREEN, 0.02 * size, "w")
+    film.arrows("wrench_space/contact", rows, over_time.contact, ORANGE, 0.02 * size, "J f", at=0.5)
+    sides = np.stack([over_time.wrench, over_time.required, over_time.contact], axis=1)
+    film.still("wrench_space/sum", rr.LineStrips3D.from_fields(colors=[GREY], radii=[thin]))
+    film.send("wrench_space/sum", rows, rr.LineStrips3D, strips=sides)
 
 
-Series = tuple[str, str, Colour, float, Array]  # path, legend, colour, width, values (states,) or (answers,)
-
-
-def _series(drawing: _Drawing) -> dict[str, tuple[str, list[Series]]]:
-    """The plots: key -> (title, series)."""
-    run, i, n, N = drawing.run, drawing.world, drawing.states, drawing.answers
-    wrench, predicted, measured = run.wrench[i, :N], run.force[i, :N, 0], run.force_measured[i, :N, 0]
-    planned = drawing.planned_mu
-    with np.errstate(invalid="ignore", divide="ignore"):
-        use = np.where(measured[:, 1] > 0.0, np.abs(measured[:, 0]) / (run.mu_world * measured[:, 1]), np.nan)
+def _series(film: _Film) -> dict[str, tuple[Colour, float, Array]]:
+    """The lines of the plots: <plot>/<series> -> colour, width, values (states,) or (answers,)."""
+    run, i, n, N = film.run, film.world, film.states, film.answers
+    (F_u, F_v, M), predicted, measured = run.wrench[i, :N].T, run.force[i, :N, 0], run.force_measured[i, :N, 0]
     return {
-        "angle": (
-            "angle [deg]",
-            [
-                ("reference", "reference", WHITE, WIDE, np.rad2deg(run.reference[0][:n])),
-                ("theta", "theta", GREEN, FINE, np.rad2deg(run.theta[i, :n])),
-            ],
-        ),
-        "slip": (
-            "slip of the corner [mm]",
-            [
-                ("predicted", "predicted", WHITE, FINE, 1e3 * predicted_slip(run)[i, :n]),
-                ("measured", "measured", RED, WIDE, 1e3 * run.slip[i, :n]),
-            ],
-        ),
-        "friction_use": (
-            "friction use |f_t| / (mu f_n)",
-            [
-                ("limit", "slides at 1", WHITE, FINE, np.ones(N)),
-                ("planned", "planned up to", PURPLE, FINE, np.full(N, planned / run.mu_world)),
-                ("measured", "measured", RED, WIDE, use),
-            ],
-        ),
-        "force": (
-            "contact force [N]",
-            [
-                ("measured_normal", "measured f_n", RED, WIDE, measured[:, 1]),
-                ("measured_tangential", "measured f_t", PINK, WIDE, measured[:, 0]),
-                ("predicted_normal", "predicted f_n", ORANGE, FINE, predicted[:, 1]),
-                ("predicted_tangential", "predicted f_t", YELLOW, FINE, predicted[:, 0]),
-            ],
-        ),
-        "wrench": (
-            "applied wrench [N, N m]",
-            [
-                ("F_u", "F_u [N]", GREEN, FINE, wrench[:, 0]),
-                ("F_v", "F_v [N]", LIME, FINE, wrench[:, 1]),
-                ("M", "M [N m]", TEAL, FINE, wrench[:, 2]),
-            ],
-        ),
+        "angle/reference": (WHITE, WIDE, np.rad2deg(run.reference[0][:n])),
+        "angle/theta": (GREEN, FINE, np.rad2deg(run.theta[i, :n])),
+        "slip/measured": (RED, WIDE, 1e3 * run.slip[i, :n]),
+        "slip/predicted": (WHITE, FINE, 1e3 * predicted_slip(run)[i, :n]),
+        "friction_use/limit": (WHITE, FINE, np.ones(N)),
+        "friction_use/measured": (RED, WIDE, run.friction_use[i, :N]),
+        "friction_use/planned": (PURPLE, FINE, np.full(N, film.planned_mu / run.mu_world)),
+        "force/measured_f_n": (RED, WIDE, measured[:, 1]),
+        "force/measured_f_t": (PINK, WIDE, measured[:, 0]),
+        "force/predicted_f_n": (ORANGE, FINE, predicted[:, 1]),
+        "force/predicted_f_t": (YELLOW, FINE, predicted[:, 0]),
+        "wrench/F_u": (GREEN, FINE, F_u),
+        "wrench/F_v": (LIME, FINE, F_v),
+        "wrench/M": (TEAL, FINE, M),
+        "solve_us": (YELLOW, FINE, run.control_us[:N]),
     }
 
 
-def _plots(drawing: _Drawing, stream: Any) -> None:
-    """Every time series, and the solve time."""
-    series = [(f"plots/{key}/{entry[0]}", *entry[1:]) for key, (_, all_of) in _series(drawing).items() for entry in all_of]
-    series.append(("plots/solve_us", "one problem", YELLOW, FINE, drawing.run.control_us[: drawing.answers]))
-    import rerun as rr
-
-    for entity, legend, colour, width, values in series:
-        stream.log(entity, rr.SeriesLines(colors=[colour], names=[legend], widths=[width]), static=True)
-        rows = drawing.rows(values.size, PLOTS)
-        _send(drawing, stream, entity, rows, rr.Scalars.columns(scalars=values[rows]))
+def _plots(film: _Film) -> None:
+    """Every line of every plot."""
+    for name, (colour, width, values) in _series(film).items():
+        film.still(f"plots/{name}", film.rr.SeriesLines(colors=[colour], widths=[width]))
+        rows = film.rows(values.size, PLOTS)
+        film.send(f"plots/{name}", rows, film.rr.Scalars, scalars=values[rows])
 
 
-def _report(drawing: _Drawing) -> str:
-    """Verdict and checks, as Markdown."""
-    run, i = drawing.run, drawing.world
+def _report(film: _Film) -> str:
+    """Verdict, checks and how to read the picture, as Markdown."""
+    run, i = film.run, film.world
     lines = [f"# {run.scenario.name}: {'FAIL' if i in run.failed_worlds else 'pass'}", run.scenario.summary, ""]
-    lines += [f"World {i} of {run.worlds}, seed {run.seed}, {run.time[-1]:g} s at dt = {run.dt:g} s.", ""]
-    if drawing.states < run.time.size:
-        lines += [f"**It diverged: recorded up to {run.time[drawing.states - 1]:g} s.**", ""]
+    lines += [f"World {i} of {run.worlds}, seed {run.seed}: {run.time[-1]:g} s, dt = {run.dt:g} s.", ""]
+    if film.states < run.time.size:
+        lines += [f"**It diverged at {run.time[film.states]:g} s and is recorded up to there.**", ""]
     lines += ["| check | value | limit | |", "|---|---|---|---|"]
     for check in run.checks:
         value = getattr(run.measures, check.name)[i]
         lines.append(f"| {check.name} | {value:.3g} | {check.limit:.3g} | {'FAIL' if check.failed[i] else 'ok'} |")
+    lines += ["", f"Green: applied w. Orange: contact force f predicted, red: measured. {1e3 * film.scale:.3g} mm / N."]
     return "\n".join(lines)
 
 
-def _blueprint(drawing: _Drawing) -> Any:
+def _blueprint(film: _Film) -> Any:
     """What is shown on opening: side view, wrench space and report on the left, the plots on the right."""
     import rerun.blueprint as rrb
 
-    side, table = drawing.side, drawing.table
-    up = np.array([0.0, 0.0, 1.0])
-    target = drawing.run.truth.origin + 0.6 * side * up
-    view = rrb.Spatial3DView(
-        origin="world",
-        name="side view",
-        background=(24, 26, 30),
-        line_grid=False,
-        eye_controls=rrb.EyeControls3D(
-            position=target - 2.3 * side * table[:, 1] + 0.25 * side * up, look_target=target, eye_up=up
-        ),
-    )
-    reach = drawing.reach
-    space = rrb.Spatial3DView(
-        origin="wrench_space",
-        name="wrench space, object axes",
-        background=(24, 26, 30),
-        line_grid=False,
-        eye_controls=rrb.EyeControls3D(
-            position=reach * np.array([1.3, -1.6, 0.4]), look_target=np.zeros(3), eye_up=up
-        ),
-    )
+    def view(origin: str, name: str, eye: Array, target: Array) -> Any:
+        eyes = rrb.EyeControls3D(position=eye, look_target=target, eye_up=UP)
+        return rrb.Spatial3DView(origin=origin, name=name, eye_controls=eyes, background=DARK, line_grid=False)
+
+    target = film.run.truth.origin + 0.62 * film.side * UP
+    side = view("world", "side view", target + film.side * (0.25 * UP - 2.05 * film.away), target)
+    aside, centre = film.reach * np.array([[0.35, 1.9, 1.2], [0.15, 0.15, 0.0]])
+    space = view("wrench_space", "wrench space, object axes", aside, centre)
     plots = [
-        rrb.TimeSeriesView(origin=f"plots/{key}", name=title, plot_legend=rrb.PlotLegend(corner="RightTop"))
-        for key, (title, _) in _series(drawing).items()
+        rrb.TimeSeriesView(origin=f"plots/{name}", name=title, plot_legend=rrb.PlotLegend(corner))
+        for name, (title, corner) in TITLES.items()
     ]
-    plots.append(rrb.TimeSeriesView(origin="plots/solve_us", name="solve time [us]"))
-    report = rrb.TextDocumentView(origin="report", name="verdict")
-    duration = float(drawing.run.time[-1])
+    below = rrb.Horizontal(space, rrb.TextDocumentView(origin="report", name="verdict"), column_shares=[5, 4])
+    left = rrb.Vertical(side, below, row_shares=[10, 9])
+    speed = min(1.0, 0.25 * float(film.run.time[-1]))  # four seconds to watch, at least
     return rrb.Blueprint(
-        rrb.Horizontal(
-            rrb.Vertical(view, rrb.Horizontal(space, report, column_shares=[5, 4]), row_shares=[5, 4]),
-            rrb.Grid(*plots, grid_columns=2),
-            column_shares=[6, 5],
-        ),
-        rrb.TimePanel(
-            state="collapsed", timeline="sim_time", loop_mode="all", playback_speed=min(1.0, 0.25 * duration)
-        ),
+        rrb.Horizontal(left, rrb.Grid(*plots, grid_columns=2), column_shares=[6, 5]),
+        rrb.TimePanel(state="collapsed", timeline="sim_time", loop_mode="all", playback_speed=speed),
         collapse_panels=True,
     )

@@ -3,13 +3,12 @@
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
-
 from pivoting.controller.example import EXAMPLES, Digit
 from pivoting.controller.solvers import Solution
 from pivoting.sim.run import Run
 from pivoting.sim.scenario import SCENARIOS
+from rich.console import Console
+from rich.table import Table
 
 # name in the summary: (what people read, factor, unit)
 _LINES = {
@@ -88,8 +87,8 @@ def print_examples(console: Console, results: list[tuple[list[Digit], Solution]]
     exact = [digit for digit in results[0][0] if digit.agrees and not digit.rounds]
     for digit in exact:
         console.print(
-            f"{digit.quantity}: the notes print {digit.expected}; the optimum is {digit.value:.7f}, one unit of the last"
-            " digit away, which is what their solver's tolerance leaves (docs/errata.md).",
+            f"{digit.quantity}: the notes print {digit.expected}; the optimum is {digit.value:.7f}, one unit of the"
+            " last digit away, which is what their solver's tolerance leaves (docs/errata.md).",
             soft_wrap=True,
             highlight=False,
         )

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
 from pivoting.models.reading import PlanarBody, matrix
 from pivoting.sim.attach import Attached
 from pivoting.sim.fidelity import ContactRows
@@ -110,6 +109,13 @@ class Run:
     def slip(self) -> Array:
         """(W, N+1) displacement of the material corner along the table since the start [m]."""
         return self.corner[..., 0] - self.corner[:, :1, 0]
+
+    @cached_property
+    def friction_use(self) -> Array:
+        """(W, N) measured |f_t| / (mu f_n) with the world's mu, at 1 the contact slides; nan without a push."""
+        tangential, normal = np.abs(self.force_measured[..., 0, 0]), self.force_measured[..., 0, 1]
+        pushed = normal > 0.0
+        return np.where(pushed, tangential, np.nan) / np.where(pushed, self.mu_world * normal, 1.0)
 
     @cached_property
     def measures(self) -> Measures:

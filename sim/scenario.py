@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from pivoting.controller.laws import FORMULATIONS, Law
 from pivoting.controller.problem import wrench_weight
 from pivoting.controller.references import Constant, MinimumJerk, Reference, Sine
@@ -103,8 +102,10 @@ class Scenario:
                 raise fail(f"world.{key}", value, "one of " + ", ".join(f"world.{k}" for k in HIDDEN_KEYS))
             number(f"world.{key}", value, **_RANGES[key])
         low, high = np.rad2deg(self.motion.angles)
-        if not (0.0 < low and high < 90.0):
-            raise fail("theta", self.theta, f"such that the block stays on its corner, in (0, 90) deg, not {low:g} to {high:g}")
+        if not (low > 0.0 and high < 90.0):
+            raise fail(
+                "theta", self.theta, f"such that the block stays on its corner, in (0, 90) deg, not {low:g} to {high:g}"
+            )
 
     @property
     def path(self) -> Path:

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from pivoting.sim.run import Run
     from pivoting.sim.monitor import Measures
+    from pivoting.sim.run import Run
 
 
 @dataclass(frozen=True)
@@ -64,9 +64,7 @@ def judge(measures: "Measures", limits: Limits) -> tuple[Check, ...]:
         "force_mismatch_rel": (measures.force_mismatch_rel, limits.force_mismatch_rel),
         "unsolved_steps": (measures.unsolved_steps, 0.0),
     }
-    return tuple(
-        Check(name, float(np.max(value)), limit, ~(value <= limit)) for name, (value, limit) in pairs.items()
-    )
+    return tuple(Check(name, float(np.max(value)), limit, ~(value <= limit)) for name, (value, limit) in pairs.items())
 
 
 def assert_sticking(run: "Run", *, slip_m: float | None = None, contact_lost_s: float | None = None) -> None:
@@ -77,8 +75,8 @@ def assert_sticking(run: "Run", *, slip_m: float | None = None, contact_lost_s: 
         slip_m, contact_lost_s: limits in place of the scenario's own.
 
     Raises:
-        AssertionError: it names the check, the worst world, its value, the limit, and the slip that the simulator itself
-            is expected to cause.
+        AssertionError: it names the check, the worst world, its value, the limit, and the slip that is the simulator's
+            own.
     """
     limits = run.scenario.limits
     over = {

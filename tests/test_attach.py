@@ -134,10 +134,10 @@ def test_a_state_that_is_not_a_number_is_an_error_with_its_evidence() -> None:
 def test_data_of_another_model_is_refused() -> None:
     controller = attach(load(scene_path("balance-2d")).compile(), body="block", contacts=[(-0.5, -0.5)])
     other = model_with("<freejoint/>")
-    with pytest.raises(ValueError, match="data = .*7 positions"):
+    with pytest.raises(ValueError, match=r"data = .*7 positions"):
         controller.wrench(mujoco.MjData(other), 0.5)
 
 
 def test_not_a_model() -> None:
-    with pytest.raises(ValueError, match="model = 'file.xml'"):
+    with pytest.raises(ValueError, match=r"model = 'file.xml'"):
         attach("file.xml", body="b", contacts=[(0.0, 0.0)])  # type: ignore[arg-type]

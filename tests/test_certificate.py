@@ -9,7 +9,7 @@ from tests.conftest import random_problem
 
 
 def test_it_agrees_with_a_general_purpose_optimiser() -> None:
-    """SLSQP knows nothing of cones or certificates; where it ends, the certificate is small, and at no better a cost."""
+    """SLSQP knows nothing of cones or certificates; where it ends, the certificate is small and the cost no less."""
     rng = np.random.default_rng(1)
     J = np.array([[0.9, 0.43], [-0.43, 0.9], [0.3, -0.6]])
     for _ in range(20):
@@ -40,10 +40,10 @@ def test_every_kind_of_error_shows(kind: str) -> None:
         if kind == "wrench":
             w = w + 1e-3 * np.abs(problem.required).max()
         elif kind == "along":  # a feasible, balanced answer that is not the cheapest
-            f = f + [0.0, 0.01 * size]
+            f = f + np.array([0.0, 0.01 * size])
             w = problem.required - problem.jacobian @ f
         elif kind == "outside":
-            f = f + [2.0 * problem.mu_planned[0] * f[1] + 0.01 * size, 0.0]
+            f = f + np.array([2.0 * problem.mu_planned[0] * f[1] + 0.01 * size, 0.0])
             w = problem.required - problem.jacobian @ f
         else:
             w, f = 1.001 * w, 1.001 * f

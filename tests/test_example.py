@@ -5,7 +5,6 @@ import pytest
 from pivoting.controller import solve
 from pivoting.controller.example import EXAMPLES, compare, quantities
 
-
 SHIPPED = ("closed-form", "clarabel", "qp:clarabel", "qp:daqp", "qp:piqp", "qp:quadprog")
 
 

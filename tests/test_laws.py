@@ -16,7 +16,7 @@ def required(law: Law, state: Motion, desired: Motion | None = None, gravity: tu
 
 
 def test_static_is_the_weight_in_object_axes() -> None:
-    """Erratum 2: R(theta)(0, -g) = -g (sin, cos); printed is -g (cos, sin), that of a table inclined by 90 - 2 theta."""
+    """Erratum 2: R(theta)(0, -g) = -g (sin, cos); printed is -g (cos, sin), a table inclined by 90 - 2 theta."""
     theta = np.deg2rad(30.0)
     np.testing.assert_allclose(required(Law.static(), Motion(theta)), [10.0 * np.sin(theta), 10.0 * np.cos(theta), 0.0])
     incline = np.deg2rad(90.0) - 2.0 * theta

@@ -74,7 +74,7 @@ def test_the_loop_solves_the_same_problem_as_people_do(shipped: Callable[[str], 
 
 
 def test_energy_is_accounted_for(shipped: Callable[[str], Run]) -> None:
-    """Conserved quantity: work of the applied wrench = gain of kinetic and potential energy; a stuck contact does none."""
+    """Conserved quantity: work of the applied wrench = gain of energy; a stuck contact does none."""
     run = shipped("pivot-2d")
     dx = np.diff(run.position[0], axis=0)
     dtheta = np.diff(run.theta[0])
@@ -152,6 +152,7 @@ def test_arrays_cannot_be_changed(shipped: Callable[[str], Run]) -> None:
         ({"world": {"dt": 1.0}}, "world.dt = 1.0.*world.mu"),
         ({"world.mu": -1.0}, "world.mu = -1.0.*> 0"),
         ({"seconds": 3000.0, "dt": 1e-4}, "seconds = .*steps"),
+        ({"name": "balance-2d", "seconds": 0.4}, "seconds = 0.4.*0.5 s that the verdict lets settle"),
     ],
 )
 def test_bad_input_is_named(arguments: dict, message: str) -> None:

@@ -90,11 +90,9 @@ def test_a_solver_that_gives_up_is_a_failure_not_a_zero() -> None:
     assert "MaxIterations" in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("method", "word"), [("gurobi", "closed-form"), ("qp:nope", "quadprog"), ("", "clarabel")]
-)
+@pytest.mark.parametrize(("method", "word"), [("gurobi", "closed-form"), ("qp:nope", "quadprog"), ("", "clarabel")])
 def test_unknown_methods_are_named(method: str, word: str) -> None:
-    with pytest.raises(ValueError, match=f"method = '{method}'.*{word}"):
+    with pytest.raises(ValueError, match=rf"method = '{method}'.*{word}"):
         solve(WrenchProblem(J, [0.0, 9.0, 0.0], 0.3), method)
 
 
@@ -105,7 +103,7 @@ def test_several_contacts_are_solved_by_the_general_methods() -> None:
     found = [solve(problem, method).force for method in ("clarabel", "qp:daqp", "qp:quadprog")]
     for force in found:
         np.testing.assert_allclose(force, [[0.0, 10.0 / 3.0], [0.0, 10.0 / 3.0]], atol=1e-6)
-    with pytest.raises(ValueError, match="method = 'closed-form'.*2 contacts"):
+    with pytest.raises(ValueError, match=r"method = 'closed-form'.*2 contacts"):
         solve(problem)
 
 

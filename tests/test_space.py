@@ -48,7 +48,7 @@ def test_positive_theta_lifts_the_right_side() -> None:
 
 
 def test_motion_of_space_is_checked() -> None:
-    with pytest.raises(ValueError, match="orientation = .*unit quaternion"):
+    with pytest.raises(ValueError, match=r"orientation = .*unit quaternion"):
         space(3).lift_motion(Motion([1.0, 1.0, 0.0, 0.0]))
-    with pytest.raises(ValueError, match="orientation = .*plane"):
+    with pytest.raises(ValueError, match=r"orientation = .*plane"):
         space(2).lift_motion(Motion([1.0, 0.0, 0.0, 0.0]))

@@ -1,0 +1,76 @@
+"""The rooms: who may import whom, how long a file may be, and that what is declared is what is used."""
+
+import ast
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+ROOMS = {"controller": {"controller"}, "models": {"models"}, "sim": {"controller", "models", "sim"}}
+FILES = [path for room in ROOMS for path in sorted((ROOT / room).glob("*.py"))]
+
+
+def imported(path: Path) -> set[str]:
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            names.add(node.module or "")
+    return names
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_rooms_import_only_what_they_may(path: Path) -> None:
+    room = path.parent.name
+    own = {name.split(".")[1] for name in imported(path) if name.startswith("pivoting.")}
+    assert own <= ROOMS[room]
+    if room == "controller":
+        assert not {name for name in imported(path) if name.split(".")[0] in ("mujoco", "rerun")}
+    assert not {name.split(".")[0] for name in imported(path)} & set(ROOMS), "bare room names"
+
+
+@pytest.mark.parametrize("path", [*FILES, *sorted((ROOT / "tests").glob("*.py"))], ids=lambda path: path.name)
+def test_no_file_is_too_long(path: Path) -> None:
+    assert len(path.read_text().splitlines()) <= 400
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_everything_public_is_documented(path: Path) -> None:
+    tree = ast.parse(path.read_text())
+    if path.stat().st_size:
+        assert ast.get_docstring(tree), path
+    for node in ast.walk(tree):
+        public = isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith("_")
+        if public and node.name not in ("angles",):
+            inner = isinstance(node, ast.FunctionDef) and any(
+                node in ast.walk(other) and other is not node
+                for other in ast.walk(tree)
+                if isinstance(other, ast.FunctionDef)
+            )
+            assert inner or ast.get_docstring(node), f"{path.name}: {node.name}"
+
+
+def test_what_is_imported_is_declared() -> None:
+    """A dependency that happens to be installed is missing on the next machine."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    declared = {line.split(">")[0].split("=")[0].split("<")[0].strip() for line in project["dependencies"]}
+    packages = {"rerun": "rerun-sdk", "mpl_toolkits": "matplotlib"}
+    import sys
+
+    for path in FILES:
+        for name in imported(path):
+            top = name.split(".")[0]
+            if top not in sys.stdlib_module_names and top != "pivoting":
+                assert packages.get(top, top) in declared, f"{path}: {top}"
+
+
+def test_importing_the_mathematics_does_not_import_the_simulator() -> None:
+    import subprocess
+    import sys
+
+    code = "import sys, pivoting.controller; print([m for m in ('mujoco', 'rerun', 'matplotlib') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,132 @@
+"""The command line as a stranger uses it: real processes, exit codes, one line for a wrong call."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+KEYS = {
+    "scenario", "seed", "worlds", "verdict", "failed_worlds", "slip_max_m", "slip_floor_m", "angle_error_rms_deg",
+    "angle_error_max_deg", "contact_lost_s", "friction_use_max", "force_mismatch_rel", "residual_max",
+    "solve_us_median", "solve_us_p99", "sim_s", "wall_s",
+}  # fmt: skip
+
+
+def pivoting(*words: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "pivoting.sim", *words],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        timeout=300,
+        check=False,
+    )
+
+
+def test_example_json() -> None:
+    """Every printed digit, by the closed form, Clarabel and at least three backends of qpsolvers."""
+    done = pivoting("example", "--json")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["agrees"] is True
+    printed = [row for row in told["results"] if row["example"] == "printed"]
+    agreeing = {row["method"] for row in printed if row["agrees"] and row["status"] == "solved"}
+    assert {"closed-form", "clarabel"} <= agreeing
+    assert len([method for method in agreeing if method.startswith("qp:")]) >= 3
+    assert printed[0]["digits"]["f_t"]["printed"] == "1.39789"
+    assert printed[0]["digits"]["f_t"]["value"] == pytest.approx(1.39789, abs=5e-6)
+
+
+def test_example_for_people_and_its_figure(tmp_path: Path) -> None:
+    done = pivoting("example", "--figure", str(tmp_path / "space.png"))
+    assert done.returncode == 0
+    for words in ("1.39789", "52.6568", "closed-form", "agree", "tau: the notes print -0.10201"):
+        assert words in done.stdout
+    assert (tmp_path / "space.png").read_bytes().startswith(b"\x89PNG")
+    assert [path.name for path in tmp_path.iterdir()] == ["space.png"]
+
+
+def test_list() -> None:
+    done = pivoting("list")
+    assert done.returncode == 0
+    names = [line.split()[0] for line in done.stdout.splitlines()]
+    assert {"balance-2d", "incline-2d", "pivot-2d", "snap-2d"} <= set(names)
+
+
+def test_run_json_is_one_object_and_nothing_else() -> None:
+    done = pivoting("run", "snap-2d", "--json", "--worlds", "3", "--seed", "5")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert set(told) >= KEYS
+    assert told["verdict"] == "pass"
+    assert told["failed_worlds"] == []
+    assert (told["worlds"], told["seed"], told["scenario"]) == (3, 5, "snap-2d")
+
+
+def test_run_writes_recording_and_summary(tmp_path: Path) -> None:
+    done = pivoting("run", "snap-2d", "--out", str(tmp_path / "new" / "folder"))
+    assert done.returncode == 0, done.stderr
+    assert "pass" in done.stdout
+    out = tmp_path / "new" / "folder"
+    assert sorted(path.name for path in out.iterdir()) == ["snap-2d.rrd", "summary.json"]
+    assert json.loads((out / "summary.json").read_text())["verdict"] == "pass"
+
+
+def test_a_failed_verdict_exits_1_and_still_tells_everything() -> None:
+    done = pivoting("run", "incline-2d", "--set", "world.mu=0.2", "--set", "seconds=1", "--json")
+    assert done.returncode == 1
+    told = json.loads(done.stdout)
+    assert told["verdict"] == "fail"
+    assert told["failed_worlds"] == [0]
+
+
+def test_a_diverged_run_is_still_json() -> None:
+    """nan is not JSON: it is written as null, and the verdict is fail."""
+    done = pivoting("run", "balance-2d", "--set", "bandwidth=5000", "--set", "seconds=1", "--json")
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["verdict"] == "fail"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["run", "fly-2d"], "scenario = 'fly-2d': must be one of balance-2d"),
+        (["run", "pivot-2d", "--set", "thet=3"], "thet = '3': must be a known key"),
+        (["run", "pivot-2d", "--set", "theta=abc"], "theta = 'abc': must be a number"),
+        (["run", "pivot-2d", "--set", "theta=nan"], "theta = nan: must be a finite number"),
+        (["run", "pivot-2d", "--set", "theta=120"], "theta = 120.0: must be a finite number > 0 and < 90 [deg]"),
+        (["run", "pivot-2d", "--set", "mu=0"], "mu = 0.0: must be a finite number > 0"),
+        (["run", "pivot-2d", "--set", "theta"], "'theta': must be KEY=VALUE"),
+        (["run", "pivot-2d", "--set", "world.law=static"], "world.law"),
+        (["run", "pivot-2d", "--worlds", "0"], "'--worlds': 0 is not in the range"),
+        (["run", "pivot-2d", "--seed", "x"], "'--seed': 'x' is not a valid integer"),
+        (["run"], "Missing argument 'SCENARIO'"),
+        (["jump"], "No such command 'jump'"),
+        (["run", "pivot-2d", "--fast"], "No such option"),
+        (["example", "--figure", "x.txt"], "must end in .png, .svg or .pdf"),
+        (["example", "--figure", "nowhere/x.png"], "its folder does not exist"),
+    ],
+)
+def test_wrong_calls_are_one_line_and_exit_2(words: list[str], message: str, tmp_path: Path) -> None:
+    done = pivoting(*words, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert message in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_out_that_is_a_file_is_refused_before_the_run(tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("mine")
+    done = pivoting("run", "balance-2d", "--out", str(tmp_path / "taken"))
+    assert done.returncode == 2
+    assert "must be a folder" in done.stderr
+    assert (tmp_path / "taken").read_text() == "mine"
+
+
+def test_help_and_version() -> None:
+    assert pivoting("--help").returncode == 0
+    assert pivoting("--version").stdout.startswith("pivoting 0.")
+    assert "KEY=VALUE" in pivoting("run", "--help").stdout

@@ -1,0 +1,63 @@
+"""README says only what is true: its code prints what it shows, its figures are those of the committed results."""
+
+import contextlib
+import io
+import json
+import re
+from pathlib import Path
+
+import pytest
+from pivoting.sim import SCENARIOS
+
+ROOT = Path(__file__).parent.parent
+TEXT = (ROOT / "README.md").read_text()
+BLOCKS = re.findall(r"```python\n(.*?)```\s+```text\n(.*?)```", TEXT, flags=re.DOTALL)
+
+
+@pytest.mark.parametrize(("code", "printed"), BLOCKS, ids=range(len(BLOCKS)))
+def test_code_prints_what_is_shown(code: str, printed: str) -> None:
+    scope: dict[str, object] = {}
+    if "import numpy" not in code:
+        exec("import numpy as np", scope)
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out):
+        exec(code, scope)
+    assert out.getvalue().strip() == printed.strip()
+
+
+def test_there_is_code_and_every_block_shows_its_output() -> None:
+    assert len(BLOCKS) == TEXT.count("```python") == 3
+
+
+def test_links_and_pictures_exist() -> None:
+    for target in re.findall(r"\]\(([^)#]+)\)", TEXT):
+        assert (ROOT / target).exists(), target
+
+
+def test_make_targets_exist() -> None:
+    makefile = (ROOT / "Makefile").read_text()
+    for target in re.findall(r"make (\w+)", TEXT):
+        if target not in ("they",):
+            assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target
+
+
+def test_results_are_the_committed_ones() -> None:
+    figures = json.loads((ROOT / "benchmarks/results/evidence.json").read_text())["figures"]
+    for name in SCENARIOS:
+        (row,) = [line for line in TEXT.splitlines() if line.startswith(f"| `{name}`")]
+        shown = [float(re.sub(r"[^\d.e-]", "", cell)) for cell in row.split("|")[2:7]]
+        keys = ("slip_max_m", "slip_floor_m", "angle_error_rms_deg", "friction_use_max", "force_mismatch_rel")
+        for value, key, factor in zip(shown, keys, (1e3, 1e3, 1.0, 1.0, 100.0), strict=True):
+            assert value == pytest.approx(factor * figures[f"{name}: {key}"], rel=0.01), (name, key)
+    loop = json.loads((ROOT / "benchmarks/results/loop.json").read_text())["figures"]
+    for key in ("one world: closed / bare mj_step", "256 worlds: closed / open Batch.step"):
+        assert f"{loop[key]:.2f} x" in TEXT
+
+
+def test_recorded_evidence_is_within_its_bounds() -> None:
+    for name in ("evidence", "loop"):
+        saved = json.loads((ROOT / f"benchmarks/results/{name}.json").read_text())
+        assert saved["quick"] is False
+        assert {"processor", "cores", "python", "versions"} <= set(saved["machine"])
+        for key, bound in saved["bounds"].items():
+            assert saved["figures"][key] <= bound, key
