@@ -37,7 +37,7 @@ Rows = NDArray[np.intp]
 Colour = tuple[int, int, int]
 
 SCENE, SPACE, PLOTS = (200.0, 2_000), (50.0, 500), (np.inf, 20_000)  # at most [Hz of simulated time], at most rows
-FAR = 1e6  # [m, m/s, rad/s]: a state beyond it has diverged
+FAR = 1e4  # [m, m/s, rad/s]: a state beyond it has diverged
 HUGE = 1e30  # beyond it single precision, which views are kept in, ends
 DEPTH = 0.4  # of the drawn block, in sides: the plane knows none
 QUAD = [[0, 1, 2], [0, 2, 3]]  # triangles of four corners
@@ -94,7 +94,7 @@ def record(run: Run, path: Path, *, world: int = 0) -> Path:
 @np.errstate(over="ignore", invalid="ignore")  # of what diverges: `_Film.send` leaves it out
 def _encoded(run: Run, world: int, rr: Any) -> bytes:
     """The file, made in memory: rerun's own file sink can hang on a full disk."""
-    name = f"{run.scenario.name}-seed{run.seed}-world{world}"  # fixed, and without properties: files can be compared
+    name = f"{run.scenario.label} seed={run.seed} world={world}"  # fixed, without properties: files can be compared
     stream = rr.RecordingStream("pivoting", recording_id=name, send_properties=False)
     memory = stream.memory_recording()
     film = _Film(run, world, rr, stream)
@@ -121,8 +121,8 @@ class _Film:
 
     def send(self, entity: str, rows: Rows, archetype: Any, *, each: int = 1, **values: Array) -> None:
         """Send columns `values` (R each, ...) of an archetype that has `each` instances at each of the R `rows`."""
-        drawn = [np.abs(value.reshape(rows.size, -1)) < HUGE for value in values.values()]
-        there = np.all(np.hstack(drawn), axis=1)
+        drawn = [np.all(np.abs(value) < HUGE, axis=tuple(range(1, value.ndim))) for value in values.values()]
+        there = np.all(drawn, axis=0).reshape(rows.size, each).all(axis=1)
         columns = archetype.columns(**{key: value[np.repeat(there, each)] for key, value in values.items()})
         seconds = self.rr.TimeColumn("sim_time", duration=self.run.time[rows])
         steps = self.rr.TimeColumn("step", sequence=rows)
@@ -168,10 +168,10 @@ class _Film:
 
     @cached_property
     def scale(self) -> float:
-        """Length of a drawn force [m/N]: m g is half a side, or less if the run's forces would pass 1.25 sides."""
+        """Length of a drawn force [m/N]: m g is half a side, or less if the run's forces would pass 0.8 sides."""
         forces = self.run.wrench[self.world, :, :2], self.run.force[self.world, :, 0]
         largest = max(_usual(np.linalg.norm(force[: self.answers], axis=1)) for force in forces)
-        return 0.5 * self.side / max(float(np.linalg.norm(self.weight)), 0.4 * largest, 1e-9)
+        return 0.5 * self.side / max(float(np.linalg.norm(self.weight)), 0.625 * largest, 1e-9)
 
     @property
     def away(self) -> Array:

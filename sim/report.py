@@ -25,7 +25,7 @@ _LINES = {
 def print_run(console: Console, run: Run) -> None:
     """The verdict table of a run."""
     summary = run.summary()
-    table = Table(title=f"{run.scenario.name}: {run.scenario.summary}", title_justify="left")
+    table = Table(title=f"{run.scenario.label}: {run.scenario.summary}", title_justify="left")
     for heading in ("measured in MuJoCo" + (", worst world" if run.worlds > 1 else ""), "value", "limit", ""):
         table.add_column(heading, justify="right" if heading in ("value", "limit") else "left")
     for check in run.checks:

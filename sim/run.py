@@ -142,6 +142,7 @@ class Run:
         worst = {key: float(np.max(value)) for key, value in vars(self.measures).items()}
         return {
             "scenario": self.scenario.name,
+            "changes": self.scenario.changes,
             "seed": self.seed,
             "worlds": self.worlds,
             "verdict": self.verdict,

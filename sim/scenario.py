@@ -140,6 +140,24 @@ class Scenario:
         motion = self.motion
         return motion.duration if isinstance(motion, MinimumJerk) and self.reference is not motion else self.seconds
 
+    @property
+    def changes(self) -> dict[str, Any]:
+        """What differs from the shipped scenario of this name, by key; everything, if there is none."""
+        shipped = SCENARIOS.get(self.name)
+        own = {
+            key: getattr(self, key) for key in KEYS if shipped is None or getattr(self, key) != getattr(shipped, key)
+        }
+        if "reference" in own and not isinstance(self.reference, str):
+            own["reference"] = type(self.reference).__name__
+        theirs = {} if shipped is None else shipped.world
+        hidden = {f"world.{key}": value for key, value in self.world.items() if theirs.get(key) != value}
+        return {**own, **hidden}
+
+    @property
+    def label(self) -> str:
+        """Name and changes, in the words of the command line."""
+        return " ".join([self.name, *(f"{key}={value}" for key, value in self.changes.items())])
+
     def control_law(self) -> Law:
         """The law; the quasi-dynamic one takes the time constant of `bandwidth` as its step h."""
         if self.law == "static":
