@@ -124,7 +124,7 @@ def believe(case: Scenario, controller: WrenchController | None = None) -> Attac
 
 
 class _Log(NamedTuple):
-    """What the loop keeps, time first: sensors (N+1, W, ...), answers (N, W, ...), control_ns (N,); wall_s of it all."""
+    """What the loop keeps, time first: sensors (N+1, W, ...), answers (N, W, ...), control_ns (N,), wall_s."""
 
     sensors: Array
     wrench: Array

@@ -75,6 +75,43 @@ def test_dynamic_gives_the_acceleration_it_asks_for(theta: float, omega: float) 
     assert np.linalg.norm(acceleration) < 0.02 * max(1.0, abs(alpha) * 0.7, omega**2 * 0.7)
 
 
+def test_dynamic_law_in_space_with_its_gyroscopic_terms() -> None:
+    """As in the plane: the required wrench, applied to a free body in MuJoCo, gives alpha and leaves the vertex alone.
+
+    A block of three different sides that spins about no axis of its own, so that omega x I omega counts.
+    """
+    spec = mujoco.MjSpec.from_string(
+        '<mujoco><option timestep="1e-5" gravity="1 -2 -9"/><worldbody><body name="b"><freejoint/>'
+        '<geom type="box" size=".5 .35 .7" mass="2"/></body></worldbody></mujoco>'
+    )
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    inertia = 2.0 / 3.0 * np.diag([0.35**2 + 0.7**2, 0.5**2 + 0.7**2, 0.5**2 + 0.35**2])
+    vertex = np.array([-0.5, -0.35, -0.7])
+    controller = WrenchController(Body(2.0, inertia), [Contact(vertex, 0.4)], Law.dynamic(20.0), (1.0, -2.0, -9.0))
+    q = np.array([0.8, 0.2, -0.4, 0.4])
+    omega, omega_d, alpha_d = np.array([1.5, -2.0, 3.0]), np.array([1.6, -2.1, 2.8]), np.array([5.0, 1.0, -3.0])
+    tip = np.array([0.02, -0.03, 0.01])  # the reference is turned by this rotation vector, object axes
+    q_d = np.empty(4)
+    mujoco.mju_copy(q_d, q)
+    mujoco.mju_quatIntegrate(q_d, tip, 1.0)
+    wrench = controller.problem(Motion(q, omega), Motion(q_d, omega_d, alpha_d)).required
+    out = np.empty((1, 6))
+    world_wrench(controller.belief.wrench_map, q[None], wrench[None], out)
+    R = np.empty(9)
+    mujoco.mju_quat2Mat(R, q)
+    R = R.reshape(3, 3)
+    data.qpos[3:] = q
+    data.qvel[:3] = -np.cross(omega, R @ vertex)  # the vertex is at rest
+    data.qvel[3:] = R.T @ omega  # a free joint's rates are in object axes
+    data.xfrc_applied[1] = out[0]
+    mujoco.mj_forward(model, data)
+    alpha = alpha_d + 400.0 * (R @ tip) + 40.0 * (omega_d - omega)
+    np.testing.assert_allclose(R @ data.qacc[3:], alpha, rtol=1e-9)
+    moved = data.qacc[:3] + np.cross(alpha, R @ vertex) + np.cross(omega, np.cross(omega, R @ vertex))
+    np.testing.assert_allclose(moved, 0.0, atol=1e-9)
+
+
 def corner(data: mujoco.MjData) -> np.ndarray:
     return data.qpos[:2] + np.array(
         [[np.cos(data.qpos[2]), -np.sin(data.qpos[2])], [np.sin(data.qpos[2]), np.cos(data.qpos[2])]]
