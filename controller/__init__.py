@@ -11,16 +11,20 @@ from pivoting.controller.contacts import Contact
 from pivoting.controller.controller import WrenchController
 from pivoting.controller.laws import Body, Law
 from pivoting.controller.problem import WrenchProblem, wrench_weight
-from pivoting.controller.references import Reference
+from pivoting.controller.references import Constant, MinimumJerk, Reference, Sampled, Sine
 from pivoting.controller.solvers import Solution, SolveError, methods, solve
 from pivoting.controller.space import Motion
 
 __all__ = [
     "Body",
+    "Constant",
     "Contact",
     "Law",
+    "MinimumJerk",
     "Motion",
     "Reference",
+    "Sampled",
+    "Sine",
     "Solution",
     "SolveError",
     "WrenchController",

@@ -75,6 +75,9 @@ class WrenchController:
         Q_w: ArrayLike | None = None,
         Q_f: ArrayLike | None = None,
     ):
+        for name, value, kind in (("body", body, Body), ("law", law, Law)):
+            if not isinstance(value, kind):
+                raise fail(name, value, f"a {kind.__name__}")
         held = tuple(contacts)
         if not held or len({contact.dim for contact in held}) != 1:
             raise fail("contacts", held, "at least one contact, all planar or all spatial")
@@ -87,7 +90,7 @@ class WrenchController:
         put(self, "contacts", held)
         put(self, "law", law)
         put(self, "gravity", array("gravity", gravity, (3,) if np.size(gravity) == 3 else (dim,)))
-        put(self, "base", array("base", base, (4,)))
+        put(self, "base", space(dim, base).base)
         put(self, "margin", number("margin", margin, at_least=0.0, below=1.0))
         weight = wrench_weight(dim, reach) if Q_w is None else Q_w
         put(self, "Q_w", positive_definite("Q_w", weight, 3 * dim - 3))

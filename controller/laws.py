@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 from pivoting.controller.space import cross, into, rotation_error
-from pivoting.controller.validate import number, one_of
+from pivoting.controller.validate import number, one_of, positive_definite
 
 FORMULATIONS = ("static", "quasi-dynamic", "dynamic")
 
@@ -23,6 +23,8 @@ class Body:
         number("mass", self.mass, above=0.0, unit="kg")
         if np.ndim(self.inertia) == 0:
             number("inertia", self.inertia, above=0.0, unit="kg m^2")  # type: ignore[arg-type]
+        else:
+            positive_definite("inertia", self.inertia, 3)
 
 
 @dataclass(frozen=True)

@@ -106,19 +106,21 @@ class Sine:
 
 
 class Sampled:
-    """Angles sampled every `dt` [s], interpolated by a quintic spline; at rest at the last angle after the end."""
+    """Angles sampled every `dt` [s], interpolated by a quintic spline.
+
+    After the end it rests at the last angle: let the samples end at rest, or the rate jumps there.
+    """
 
     def __init__(self, samples: ArrayLike, dt: float):
         from scipy.interpolate import make_interp_spline
 
         self.samples = array("samples", samples, (None,))
-        if self.samples.size < 2:
-            raise fail("samples", self.samples, "at least two angles [rad]")
+        if self.samples.size < 6:
+            raise fail("samples", self.samples, "at least six angles [rad], as a quintic spline needs")
         self.dt = number("dt", dt, above=0.0, unit="s")
         knots = self.dt * np.arange(self.samples.size)
         self._end = float(knots[-1])
-        order = min(5, self.samples.size - 1)
-        self._curve = make_interp_spline(knots, self.samples, k=order if order % 2 else order - 1)
+        self._curve = make_interp_spline(knots, self.samples, k=5)
 
     def __call__(self, times: Array) -> Motion:
         times = np.asarray(times, dtype=float)

@@ -65,6 +65,8 @@ class Space:
         """The inertia tensor (3, 3) [kg m^2] about the CoM, in object axes; a planar scalar turns about y only."""
         if self.dim == 3:
             return array("inertia", inertia, (3, 3))
+        if np.ndim(inertia) != 0:
+            raise fail("inertia", inertia, "a number in the plane, about the plane's normal [kg m^2]")
         return np.diag([0.0, float(np.asarray(inertia)), 0.0])
 
     def orientation(self, angle: ArrayLike) -> Array:
@@ -87,10 +89,11 @@ class Space:
     def lift_motion(self, motion: Motion) -> tuple[Array, Array, Array]:
         """Quaternion (4,), angular velocity (3,) and acceleration (3,) in world axes of a `Motion` of this space."""
         if self.dim == 2:
-            values = [np.asarray(value, dtype=float) for value in motion]
-            for name, value in zip(Motion._fields, values, strict=True):
-                if value.ndim or not np.isfinite(value):
-                    raise fail(name, getattr(motion, name), "a finite number in the plane")
+            values = []
+            for name, value in zip(Motion._fields, motion, strict=True):
+                if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf" or not np.isfinite(value):
+                    raise fail(name, value, "a finite number in the plane")
+                values.append(float(value))  # type: ignore[arg-type]
             return self.orientation(values[0]), self.axial(values[1]), self.axial(values[2])
         quaternion = array("orientation", motion.orientation, (4,))
         if abs(np.linalg.norm(quaternion) - 1.0) > 1e-6:
@@ -101,7 +104,10 @@ class Space:
 
 def space(dim: int, base: ArrayLike = IDENTITY) -> Space:
     """The plane (`dim` 2, on a table of frame `base`) or space (`dim` 3)."""
-    return Space(dim, array("base", base, (4,)))
+    frame = array("base", base, (4,))
+    if abs(np.linalg.norm(frame) - 1.0) > 1e-6:
+        raise fail("base", frame, "a unit quaternion (w, x, y, z)")
+    return Space(dim, frame)
 
 
 def tilt(angle: float) -> Array:

@@ -5,11 +5,16 @@ Without this, an edit of `certificate.py` would leave the loop compiled in `cont
 
 from pathlib import Path
 
+from numba import config
+
 
 def drop_stale_kernels(room: Path) -> list[Path]:
     """Remove the compiled kernels of a folder if any of its sources is newer than one of them; returns what went."""
     newest = max(source.stat().st_mtime for source in room.glob("*.py"))
-    compiled = [path for path in room.glob("__pycache__/*.nb[ic]") if path.is_file()]
+    folders = [room / "__pycache__"]
+    if config.CACHE_DIR:  # numba then makes one folder for each folder of sources, named after it
+        folders += Path(config.CACHE_DIR).glob(f"{room.name}_*")
+    compiled = [path for folder in folders for path in folder.glob("*.nb[ic]") if path.is_file()]
     if all(path.stat().st_mtime >= newest for path in compiled if path.suffix == ".nbi"):
         return []
     for path in compiled:

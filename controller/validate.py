@@ -16,9 +16,12 @@ def array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
     """A read-only float copy of `value`, finite and of `shape` (None: any length)."""
     wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
     try:
-        out = np.array(value, dtype=float)
-    except (TypeError, ValueError):
+        given = np.asarray(value)
+    except ValueError:  # ragged
         raise fail(name, value, f"an array of numbers of shape {wanted}") from None
+    if given.dtype.kind not in "iuf":  # not bool, text, complex, object
+        raise fail(name, value, f"an array of real numbers of shape {wanted}")
+    out = np.array(given, dtype=float)
     if out.ndim != len(shape) or any(n not in (None, m) for n, m in zip(shape, out.shape, strict=True)):
         raise fail(name, value, f"of shape {wanted}, not {out.shape}")
     if not np.isfinite(out).all():

@@ -42,18 +42,15 @@ class PlanarBody:
     origin: Array
     gravity: Array
 
-    def body_point(self, point: ArrayLike) -> Array:
-        """(3,) body-frame coordinates of a point given along (u, v) from the CoM: the inverse of `point`."""
-        u, v = np.asarray(point, dtype=float)
-        return self.com + matrix(self.axes) @ np.array([u, 0.0, v])
-
     def point(self, contact: ArrayLike) -> Array:
         """(2,) from the CoM along the object's in-plane axes (u, v) of a point given in the body frame.
 
         Args:
             contact: (3,) in the body frame, or (2,) along (u, v) from the body's origin [m].
         """
-        given = np.asarray(contact, dtype=float)
+        given = np.asarray(contact)
+        if given.dtype.kind not in "iuf":
+            raise ModelError(f"contact = {contact!r}: must be 2 in-plane or 3 body-frame coordinates [m]")
         R = matrix(self.axes)
         if given.shape == (3,) and np.isfinite(given).all():
             return (R.T @ (given - self.com))[[0, 2]]
@@ -108,8 +105,13 @@ def read_body(model: mujoco.MjModel, name: str, support: str | None = None) -> P
     first, second, normal = (data.xaxis[j] for j in joints)
     if abs(first @ second) > 1e-6 or max(abs(first @ normal), abs(second @ normal)) > 1e-6:
         raise ModelError(f"body = {name!r}: its joint axes are not perpendicular; needs {PLANAR_JOINTS}")
+    _refuse_other_forces(model, name, index, joints)
     ground = read_support(model, support)
-    table = _table_axes(data.geom_xmat[ground].reshape(3, 3)[:, 2], normal)
+    if model.body_weldid[model.geom_bodyid[ground]] != 0:
+        raise ModelError(f"support = {model.geom(ground).name!r}: it can move; must be fixed to the world")
+    weightless = bool(model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+    gravity = np.zeros(3) if weightless else np.array(model.opt.gravity)
+    table = _table_axes(data.geom_xmat[ground].reshape(3, 3)[:, 2], normal, gravity)
     body_to_world = data.xmat[index].reshape(3, 3)
     axes = _object_axes(body_to_world.T @ table[:, 1])
     inertial = matrix(model.body_iquat[index])
@@ -124,8 +126,26 @@ def read_body(model: mujoco.MjModel, name: str, support: str | None = None) -> P
         support=ground,
         table=quaternion(table),
         origin=np.array(data.geom_xpos[ground]),
-        gravity=np.array(model.opt.gravity),
+        gravity=gravity,
     )
+
+
+def _refuse_other_forces(model: mujoco.MjModel, name: str, index: int, joints: range) -> None:
+    """The controller knows of gravity, contact and its own wrench; a model that adds other forces is refused."""
+    if model.body_gravcomp[index] != 0.0:
+        raise ModelError(f"body = {name!r}: it has gravcomp = {model.body_gravcomp[index]:g}; must have none")
+    for joint in joints:
+        dof = int(model.jnt_dofadr[joint])
+        found = {
+            "stiffness": np.abs(np.ravel(model.jnt_stiffness[joint])).max(),
+            "limited": float(model.jnt_limited[joint]),
+            "damping": np.abs(np.ravel(model.dof_damping[dof])).max(),
+            "frictionloss": model.dof_frictionloss[dof],
+            "armature": model.dof_armature[dof],
+        }
+        for attribute, value in found.items():
+            if value != 0.0:
+                raise ModelError(f"body = {name!r}: a joint of it has {attribute} = {value:g}; must have none")
 
 
 def read_support(model: mujoco.MjModel, support: str | None = None) -> int:
@@ -133,7 +153,10 @@ def read_support(model: mujoco.MjModel, support: str | None = None) -> int:
     if support is not None:
         if support not in [model.geom(i).name for i in range(model.ngeom)]:
             raise ModelError(f"support = {support!r}: the model has no geom of that name")
-        return model.geom(support).id
+        found = int(model.geom(support).id)
+        if int(model.geom_type[found]) not in (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_BOX)):
+            raise ModelError(f"support = {support!r}: must be a plane or a box")
+        return found
     planes = np.flatnonzero(model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE))
     if len(planes) != 1:
         raise ModelError(f"support = None: the model has {len(planes)} planes; name the geom that the body stands on")
@@ -147,11 +170,30 @@ def read_friction(model: mujoco.MjModel, body: int, support: int) -> float:
         ModelError: the body's geoms differ in it; give mu.
     """
     geoms = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
+    ends = zip(model.pair_geom1, model.pair_geom2, strict=True)
+    pairs = {frozenset((int(a), int(b))): i for i, (a, b) in enumerate(ends)}
+    other = int(model.geom_bodyid[support])
+    excluded = {(body << 16) + other, (other << 16) + body} & {int(pair) for pair in model.exclude_signature}
     found = set()
     for geom in geoms:
+        pair = pairs.get(frozenset((geom, support)))
+        if pair is not None:
+            if model.pair_dim[pair] < 3:
+                raise ModelError("mu = None: a contact pair without friction (condim 1)")
+            found.add(float(model.pair_friction[pair, 0]))
+            continue
+        meet = (model.geom_contype[geom] & model.geom_conaffinity[support]) or (
+            model.geom_contype[support] & model.geom_conaffinity[geom]
+        )
+        if excluded or not meet:
+            continue
+        if max(model.geom_condim[geom], model.geom_condim[support]) < 3:
+            raise ModelError("mu = None: contact without friction (condim 1)")
         own, table = model.geom_friction[geom, 0], model.geom_friction[support, 0]
         order = int(model.geom_priority[geom]) - int(model.geom_priority[support])
         found.add(float(max(own, table) if order == 0 else own if order > 0 else table))
+    if not found:
+        raise ModelError("support: it and the body never touch (contype, conaffinity or exclude)")
     if len(found) != 1:
         raise ModelError(f"mu = None: the body's geoms give {sorted(found)}; give mu")
     return found.pop()
@@ -180,13 +222,35 @@ def place(
     mujoco.mj_kinematics(model, data)
 
 
-def _table_axes(n: Array, plane_normal: Array) -> Array:
-    """(3, 3) columns (t, o, n) in the world: n the support's normal, t to the right, o = n x t."""
+def turn(model: mujoco.MjModel, data: mujoco.MjData, body: PlanarBody, omega: ArrayLike, point: ArrayLike) -> None:
+    """Set qvel so that the body turns at `omega` (3,) [rad/s, world axes] about its `point` (3,) (body frame).
+
+    Positions are as in `data`; other bodies' velocities are left alone.
+    """
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    at = data.xpos[body.index] + data.xmat[body.index].reshape(3, 3) @ np.asarray(point, dtype=float)
+    translation, rotation = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+    mujoco.mj_jac(model, data, translation, rotation, at, body.index)
+    first = int(model.body_dofadr[body.index])
+    dofs = slice(first, first + int(model.body_dofnum[body.index]))
+    wanted = np.concatenate([np.zeros(3), np.asarray(omega, dtype=float)])
+    data.qvel[dofs] = np.linalg.lstsq(np.vstack([translation, rotation])[:, dofs], wanted, rcond=None)[0]
+
+
+def _table_axes(n: Array, plane_normal: Array, gravity: Array) -> Array:
+    """(3, 3) columns (t, o, n) in the world: n the support's normal, t to the right, o = n x t.
+
+    Right is seen with gravity down (or n up, without), towards the positive side of the axis that it is closest to.
+    """
     if abs(n @ plane_normal) > 1e-6:
         raise ModelError("support: its normal is not in the plane of the body's motion")
-    t = np.cross(plane_normal, n)
-    t = t * np.sign(t[np.argmax(np.abs(t))])
-    return np.column_stack([t, np.cross(n, t), n])
+    fall = gravity - (gravity @ plane_normal) * plane_normal
+    up = n if np.linalg.norm(fall) < 1e-9 else -fall / np.linalg.norm(fall)
+    right = np.cross(plane_normal, up)
+    right = right * np.sign(right[np.argmax(np.abs(right))])
+    o = np.cross(up, right)
+    return np.column_stack([np.cross(o, n), o, n])
 
 
 def _object_axes(o: Array) -> Array:

@@ -11,6 +11,7 @@ from pivoting.models.reading import ModelError, PlanarBody
 BODY, TABLE = "block", "table"  # names in the scenes
 WORLD_KEYS = ("mu", "mass", "size", "incline", "gravity", "dt", "timeconst", "impedance", "impratio")
 
+STIFF = 2.1  # time constant of the contacts, in time steps: see settings-2d.xml
 SITE = "pivoting/object"  # object axes at the centre of mass
 SENSORS = ("position", "quaternion", "velocity", "angular_velocity", "contact")
 
@@ -24,8 +25,8 @@ def load(path: Path, changes: Mapping[str, float] | None = None) -> mujoco.MjSpe
     """Read an MJCF file and apply `changes`, whose keys are `WORLD_KEYS`.
 
     mu: sliding friction of every geom. mass [kg], size [m]: of the block. incline [deg]: the table rises to the right.
-    gravity [m/s^2]: its magnitude, straight down. dt [s]: the time step; the contacts' time constant stays 2 dt unless
-    `timeconst` [s] is given. impedance: the constant solimp. impratio: the option.
+    gravity [m/s^2]: its magnitude, straight down. dt [s]: the time step; the contacts' time constant stays 2.1 dt
+    unless `timeconst` [s] is given. impedance: the constant solimp. impratio: the option.
 
     Raises:
         ModelError: the file is not MJCF.
@@ -36,7 +37,7 @@ def load(path: Path, changes: Mapping[str, float] | None = None) -> mujoco.MjSpe
         raise ModelError(f"model = {str(path)!r}: not a readable MJCF file ({error})") from None
     wanted = dict(changes or {})
     if "dt" in wanted:
-        wanted.setdefault("timeconst", 2.0 * wanted["dt"])
+        wanted.setdefault("timeconst", STIFF * wanted["dt"])
         spec.option.timestep = wanted["dt"]
     if "impratio" in wanted:
         spec.option.impratio = wanted["impratio"]
@@ -59,6 +60,18 @@ def load(path: Path, changes: Mapping[str, float] | None = None) -> mujoco.MjSpe
         if "impedance" in wanted:
             geom.solimp[:2] = wanted["impedance"]
     return spec
+
+
+def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """The model of a spec.
+
+    Raises:
+        ModelError: MuJoCo does not compile it, for the reason that it gives.
+    """
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise ModelError(f"model = {spec.modelname!r}: MuJoCo cannot compile it ({error})") from None
 
 
 def instrument(spec: mujoco.MjSpec, body: PlanarBody, support: str) -> tuple[mujoco.MjModel, dict[str, slice]]:
@@ -95,7 +108,7 @@ def instrument(spec: mujoco.MjSpec, body: PlanarBody, support: str) -> tuple[muj
         refname=body.name,
     )
     contact.intprm = [1 << int(fields.mjCONDATA_FOUND) | 1 << int(fields.mjCONDATA_FORCE), netforce, 1]
-    model = spec.compile()
+    model = compiled(spec)
     where = {}
     for name in SENSORS:
         sensor = model.sensor(f"pivoting/{name}")

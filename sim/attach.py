@@ -120,6 +120,8 @@ def attach(
     if not isinstance(model, mujoco.MjModel):
         raise fail("model", model, "a mujoco.MjModel")
     found = read_body(model, body, support)
+    if not isinstance(contacts, Sequence | np.ndarray):
+        raise fail("contacts", contacts, "a list of one point")
     points = [found.point(contact) for contact in contacts]
     if len(points) != 1:
         raise ModelError(f"contacts = {[p.tolist() for p in points]}: must be one point for a planar body")

@@ -2,6 +2,7 @@
 
 import json
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -97,8 +98,10 @@ def run(scenario: str, worlds: int, seed: int, settings: tuple[str, ...], out: P
     from pivoting.sim.report import jsonable, print_run
     from rich.console import Console
 
-    text = json.dumps(jsonable(finished.summary()), allow_nan=False, indent=None if as_json else 1)
-    if not as_json:
+    summary = jsonable(finished.summary())
+    if as_json:
+        click.echo(json.dumps(summary, allow_nan=False))
+    else:
         print_run(Console(), finished)
     if out is not None:
         from pivoting.sim.recording import record
@@ -106,13 +109,11 @@ def run(scenario: str, worlds: int, seed: int, settings: tuple[str, ...], out: P
         world = int(finished.failed_worlds[0]) if finished.failed_worlds.size else 0
         recording = record(finished, out / f"{scenario}.rrd", world=world)
         partial = out / ".summary.json.part"
-        partial.write_text(json.dumps(jsonable(finished.summary()), allow_nan=False, indent=1) + "\n")
+        partial.write_text(json.dumps(summary, allow_nan=False, indent=1) + "\n")
         partial.replace(out / "summary.json")
         click.echo(
-            f"wrote {out / 'summary.json'} and {recording} (world {world}); to see it: rerun {recording}", err=as_json
+            f"wrote {out / 'summary.json'}; world {world} in {recording}, see it with: rerun {recording}", err=as_json
         )
-    if as_json:
-        click.echo(text)
     return 1 if finished.verdict == "fail" else 0
 
 
@@ -128,6 +129,7 @@ def main() -> None:
     except (ValueError, OSError) as error:
         code = _refuse(str(error))
     except click.Abort:
+        click.echo("pivoting: interrupted", err=True)
         code = 130
     sys.exit(code)
 
@@ -149,9 +151,14 @@ def _settings(pairs: tuple[str, ...]) -> dict[str, Any]:
 
 def _make_folder(out: Path) -> None:
     """Find out before the work that its results can be kept."""
-    if out.exists() and not out.is_dir():
+    if not out.name or (out.exists() and not out.is_dir()):
         raise click.BadParameter(f"--out {str(out)!r}: must be a folder")
-    out.mkdir(parents=True, exist_ok=True)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out):
+            pass
+    except OSError as error:
+        raise click.BadParameter(f"--out {str(out)!r}: must be a folder that can be written to ({error})") from None
 
 
 def _check_figure(figure: Path) -> None:

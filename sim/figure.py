@@ -16,12 +16,11 @@ def draw_solution_space(solution: Solution, path: Path, title: str = "") -> Path
     Left: wrench space (object axes). Orange, what the contact can do, J f; blue, the applied wrenches that balance,
     required - J f. Right: the same problem in the contact force alone, with level sets of its cost.
     """
-    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
 
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure = plt.figure(figsize=(12.0, 5.4), layout="constrained")
+    figure = Figure(figsize=(12.0, 5.4), layout="constrained")
+    FigureCanvasAgg(figure)  # not pyplot, whose backend is the caller's business
     _draw_wrenches(figure.add_subplot(1, 2, 1, projection="3d"), solution)
     _draw_forces(figure.add_subplot(1, 2, 2), solution)
     if title:
@@ -32,7 +31,6 @@ def draw_solution_space(solution: Solution, path: Path, title: str = "") -> Path
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
-        plt.close(figure)
     return path
 
 

@@ -9,14 +9,14 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 from pivoting.controller.controller import Belief, WrenchController, step_worlds, world_wrench
-from pivoting.controller.space import Space
+from pivoting.controller.space import Space, space
 from pivoting.controller.validate import fail
-from pivoting.models.reading import PlanarBody, matrix, place, read_body, read_friction
-from pivoting.models.scenes import BODY, TABLE, corner, instrument, load
+from pivoting.models.reading import PlanarBody, matrix, place, read_body, read_friction, turn
+from pivoting.models.scenes import BODY, TABLE, compiled, corner, instrument, load
 from pivoting.sim.attach import Attached, attach
 from pivoting.sim.fidelity import read_rows
 from pivoting.sim.run import Run
-from pivoting.sim.scenario import Scenario, scenario
+from pivoting.sim.scenario import CONTROL_KEYS, LOWEST, Scenario, scenario
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-9  # relative KKT residual of an answer that counts as solved
@@ -47,33 +47,40 @@ def simulate(
     Raises:
         ValueError: an unknown scenario or key, or a value out of range; it is named.
     """
+    if not isinstance(name, str | Scenario):
+        raise fail("scenario", name, "a name or a Scenario")
     case = (scenario(name) if isinstance(name, str) else name).change(**overrides)
     for key, value, least in (("worlds", worlds, 1), ("seed", seed, 0)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
             raise fail(key, value, f"a whole number >= {least}")
+    if case.gravity == 0.0 and case.f_min == 0.0:
+        raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the corner on the table")
     attached = believe(case, controller)
     spec = load(case.path, case.actual)
-    nominal = spec.compile()
-    truth = read_body(nominal, BODY, TABLE)
+    truth = read_body(compiled(spec), BODY, TABLE)
     model, where = instrument(spec, truth, TABLE)
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that diverges is seen, not reset
     dt = float(model.opt.timestep)
     steps = round(case.duration / dt)
     if steps < 2 or steps * worlds > MAX_STEPS:
-        raise fail("seconds", case.duration, f"2 to {MAX_STEPS} steps in all worlds together, at dt = {dt:g} s")
+        allowed = f"such that {worlds} worlds take 2 to {MAX_STEPS} steps together, at dt = {dt:g} s"
+        raise fail("seconds", case.duration, allowed)
     if steps * dt <= case.limits.settle_s:
         raise fail("seconds", case.duration, f"more than the {case.limits.settle_s:g} s that the verdict lets settle")
     time: Array = dt * np.arange(steps + 1, dtype=float)
-    angle, rate, acceleration = (np.asarray(values, dtype=float) for values in case.motion(time))
-    desired = angle, rate, acceleration
+    desired = _desired(case, time)
+    for values in (time, *desired):
+        values.flags.writeable = False
 
     batch = Batch(model, int(worlds), nthread=1 if worlds == 1 else 0, persistent=True)
     data = mujoco.MjData(model)
     at = truth.origin - START_DEPTH * matrix(truth.table)[:, 2]
     errors = np.deg2rad(case.spread) * np.random.default_rng(seed).uniform(-1.0, 1.0, int(worlds))
-    for qpos, error in zip(batch.bind("qpos"), errors, strict=True):
+    omega = space(2, truth.table).axial(desired[1][0])
+    for qpos, qvel, error in zip(batch.bind("qpos"), batch.bind("qvel"), errors, strict=True):
         place(model, data, truth, float(desired[0][0] + error), corner(model), at)
-        qpos[:] = data.qpos
+        turn(model, data, truth, omega, corner(model))
+        qpos[:], qvel[:] = data.qpos, data.qvel
     mujoco.mj_forward(model, data)
     rows = read_rows(model, data)
 
@@ -100,15 +107,23 @@ def simulate(
         force_measured=_worlds_first(read["contact"][1:, :, 1:4] @ table).reshape(worlds, steps, 1, 2),
         residual=_worlds_first(log.residual),
         status=_worlds_first(log.status),
-        control_us=log.control_ns / (1e3 * worlds),
+        control_us=_worlds_first((log.control_ns / (1e3 * worlds))[:, None])[0],
         wall_s=log.wall_s,
+        controller="scenario" if controller is None else "given",
     )
 
 
 def believe(case: Scenario, controller: WrenchController | None = None) -> Attached:
     """The controller of a scenario (or another), attached to the world that the scenario believes in."""
-    nominal = load(case.path, case.believed).compile()
+    nominal = compiled(load(case.path, case.believed))
     if controller is not None:
+        if not isinstance(controller, WrenchController):
+            raise fail("controller", controller, "a WrenchController")
+        if [contact.dim for contact in controller.contacts] != [2]:
+            raise fail("controller", f"one with {len(controller.contacts)} contacts", "of one planar contact")
+        ignored = [key for key in CONTROL_KEYS if key in case.changes]
+        if ignored:
+            raise fail(ignored[0], case.changes[ignored[0]], "left out: the controller that is given has its own")
         return Attached(nominal, read_body(nominal, BODY, TABLE), controller)
     return attach(
         nominal,
@@ -121,6 +136,20 @@ def believe(case: Scenario, controller: WrenchController | None = None) -> Attac
         Q_w=case.wrench_weight(),
         support=TABLE,
     )
+
+
+def _desired(case: Scenario, time: Array) -> tuple[Array, Array, Array]:
+    """The reference at every step, checked: whatever it says of itself, it has to keep the block on its corner."""
+    angle, rate, acceleration = (np.array(values, dtype=float) for values in case.motion(time))
+    for name, values in (("angle", angle), ("rate", rate), ("acceleration", acceleration)):
+        if values.shape != time.shape or not np.isfinite(values).all():
+            raise fail(
+                "reference", f"{name} of shape {values.shape}", f"finite and of the shape of the times, {time.shape}"
+            )
+    low, high = np.rad2deg([angle.min(), angle.max()])
+    if not LOWEST <= low <= high <= 90.0 - LOWEST:
+        raise fail("reference", f"angles from {low:g} to {high:g} deg", f"in [{LOWEST}, {90.0 - LOWEST}] deg")
+    return angle, rate, acceleration
 
 
 class _Log(NamedTuple):

@@ -39,6 +39,7 @@ class Measures:
     unsolved_steps: Array
 
 
+@np.errstate(invalid="ignore", divide="ignore", over="ignore")  # a world that diverges fails, without noise
 def measure(run: "Run") -> Measures:
     """Measure a run. Not-a-number anywhere in a world's readings ends up in its measures, and so in the verdict."""
     settled = run.time >= run.scenario.limits.settle_s - 1e-12
@@ -47,8 +48,7 @@ def measure(run: "Run") -> Measures:
     measured, predicted = run.force_measured[:, steps, 0], run.force[:, steps, 0]
     use = run.friction_use[:, steps]
     pushed = ~np.isnan(use)
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # a world that diverges fails, without noise
-        mismatch = _rms(np.linalg.norm(measured - predicted, axis=-1)) / _rms(np.linalg.norm(predicted, axis=-1))
+    mismatch = _rms(np.linalg.norm(measured - predicted, axis=-1)) / _rms(np.linalg.norm(predicted, axis=-1))
     return Measures(
         slip_max_m=np.abs(run.slip).max(axis=1),
         slip_floor_m=np.abs(predicted_slip(run)).max(axis=1),

@@ -25,7 +25,8 @@ _LINES = {
 def print_run(console: Console, run: Run) -> None:
     """The verdict table of a run."""
     summary = run.summary()
-    table = Table(title=f"{run.scenario.label}: {run.scenario.summary}", title_justify="left")
+    console.print(f"[bold]{run.scenario.label}[/]: {run.scenario.summary}", soft_wrap=True, highlight=False)
+    table = Table()
     for heading in ("measured in MuJoCo" + (", worst world" if run.worlds > 1 else ""), "value", "limit", ""):
         table.add_column(heading, justify="right" if heading in ("value", "limit") else "left")
     for check in run.checks:
@@ -48,7 +49,8 @@ def print_run(console: Console, run: Run) -> None:
     )
     console.print(
         f"{summary['sim_s']:g} s simulated in {summary['wall_s']:.2f} s; stating, solving and certifying the problem:"
-        f" {summary['solve_us_median']:.1f} us a step (99th percentile {summary['solve_us_p99']:.1f})"
+        f" {summary['solve_us_median']:.1f} us a step (99th percentile {summary['solve_us_p99']:.1f})",
+        soft_wrap=True,
     )
 
 

@@ -1,11 +1,12 @@
 """A finished run: its arrays, and what is derived from them."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.controller.space import Space, space
 from pivoting.models.reading import PlanarBody, matrix
 from pivoting.sim.attach import Attached
 from pivoting.sim.fidelity import ContactRows
@@ -14,6 +15,12 @@ from pivoting.sim.scenario import Scenario
 from pivoting.sim.verdict import Check, judge
 
 Array = NDArray[np.float64]
+
+
+def _frozen(values: Array) -> Array:
+    """What is measured cannot be changed before it is judged."""
+    values.flags.writeable = False
+    return values
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +46,7 @@ class Run:
         residual: (W, N) relative KKT residuals.  status: (W, N) codes of `solvers.STATUS`, 0 is solved.
         control_us: (N,) time to state, solve and certify the problem of one world [microseconds].
         wall_s: of the loop.
+        controller: "scenario" for the scenario's own, "given" for another that was handed to `simulate`.
     """
 
     scenario: Scenario
@@ -62,6 +70,7 @@ class Run:
     status: NDArray[np.int8]
     control_us: Array
     wall_s: float
+    controller: str
 
     @property
     def worlds(self) -> int:
@@ -74,20 +83,25 @@ class Run:
         return float(self.time[1] - self.time[0])
 
     @cached_property
+    def space(self) -> Space:
+        """The plane of motion, with angles from the table that the world has, whatever the controller believes."""
+        return space(2, self.truth.table)
+
+    @cached_property
     def theta(self) -> Array:
-        """(W, N+1) angle from the table [rad]."""
-        return self.attached.controller.space.angle(self.quaternion)
+        """(W, N+1) angle from the world's table [rad]."""
+        return _frozen(self.space.angle(self.quaternion))
 
     @cached_property
     def omega(self) -> Array:
         """(W, N+1) rate of theta [rad/s]."""
-        return self.angular_velocity @ self.attached.controller.space.axial(1.0)
+        return _frozen(self.angular_velocity @ self.space.axial(1.0))
 
     @cached_property
     def angle_error(self) -> Array:
         """(W, N+1) theta minus the reference [rad]."""
         difference = self.theta - self.reference[0]
-        return np.arctan2(np.sin(difference), np.cos(difference))
+        return _frozen(np.arctan2(np.sin(difference), np.cos(difference)))
 
     @cached_property
     def table_axes(self) -> Array:
@@ -98,24 +112,24 @@ class Run:
     def lever(self) -> Array:
         """(W, N+1, 2) from the CoM to the material corner along the table's tangent and normal [m]."""
         (u, v), s, c = self.corner_point, np.sin(self.theta), np.cos(self.theta)
-        return np.stack([c * u - s * v, s * u + c * v], axis=-1)
+        return _frozen(np.stack([c * u - s * v, s * u + c * v], axis=-1))
 
     @cached_property
     def corner(self) -> Array:
         """(W, N+1, 2) material corner from the table's origin along its tangent and normal [m]."""
-        return (self.position - self.truth.origin) @ self.table_axes + self.lever
+        return _frozen((self.position - self.truth.origin) @ self.table_axes + self.lever)
 
     @cached_property
     def slip(self) -> Array:
         """(W, N+1) displacement of the material corner along the table since the start [m]."""
-        return self.corner[..., 0] - self.corner[:, :1, 0]
+        return _frozen(self.corner[..., 0] - self.corner[:, :1, 0])
 
     @cached_property
     def friction_use(self) -> Array:
         """(W, N) measured |f_t| / (mu f_n) with the world's mu, at 1 the contact slides; nan without a push."""
         tangential, normal = np.abs(self.force_measured[..., 0, 0]), self.force_measured[..., 0, 1]
         pushed = normal > 0.0
-        return np.where(pushed, tangential, np.nan) / np.where(pushed, self.mu_world * normal, 1.0)
+        return _frozen(np.where(pushed, tangential, np.nan) / np.where(pushed, self.mu_world * normal, 1.0))
 
     @cached_property
     def measures(self) -> Measures:
@@ -143,6 +157,8 @@ class Run:
         return {
             "scenario": self.scenario.name,
             "changes": self.scenario.changes,
+            "limits": asdict(self.scenario.limits),
+            "controller": self.controller,
             "seed": self.seed,
             "worlds": self.worlds,
             "verdict": self.verdict,

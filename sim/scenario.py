@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,9 @@ from pivoting.models.scenes import WORLD_KEYS, scene_path
 from pivoting.sim.verdict import Limits
 
 HIDDEN_KEYS = ("mu", "mass", "size", "incline", "gravity")  # what the world may have and the controller not know
+CONTROL_KEYS = ("law", "bandwidth", "damping", "margin", "f_min", "length")  # of the controller alone
+LOWEST = 0.1  # [deg] from a face: closer, the next corner touches the table too
+_OPTIONAL = ("length", *WORLD_KEYS)  # None: as the scene or the contact has it
 _POSITIVE = {"above": 0.0}
 _RANGES: dict[str, dict[str, Any]] = {
     "mu": {**_POSITIVE, "at_most": 10.0},
@@ -25,8 +29,8 @@ _RANGES: dict[str, dict[str, Any]] = {
     "timeconst": {**_POSITIVE, "at_most": 1.0, "unit": "s"},
     "impedance": {**_POSITIVE, "below": 1.0},
     "impratio": {**_POSITIVE, "at_most": 1e9},
-    "theta": {**_POSITIVE, "below": 90.0, "unit": "deg"},
-    "theta_end": {**_POSITIVE, "below": 90.0, "unit": "deg"},
+    "theta": {"at_least": LOWEST, "at_most": 90.0 - LOWEST, "unit": "deg"},
+    "theta_end": {"at_least": LOWEST, "at_most": 90.0 - LOWEST, "unit": "deg"},
     "seconds": {**_POSITIVE, "at_most": 3600.0, "unit": "s"},
     "hold": {"at_least": 0.0, "at_most": 3600.0, "unit": "s"},
     "amplitude": {"at_least": 0.0, "below": 45.0, "unit": "deg"},
@@ -91,21 +95,24 @@ class Scenario:
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
+        if isinstance(self.reference, np.ndarray | list | tuple):
+            raise fail("reference", type(self.reference).__name__, "Sampled(samples, dt), which knows their times")
         if isinstance(self.reference, str) or not callable(self.reference):
             one_of("reference", self.reference, ("constant", "arc", "return", "sine"))
         one_of("law", self.law, FORMULATIONS)
+        if not isinstance(self.limits, Limits):
+            raise fail("limits", self.limits, "Limits")
         for key in _RANGES:
-            if getattr(self, key) is not None:
+            if getattr(self, key) is not None or key not in _OPTIONAL:
                 number(key, getattr(self, key), **_RANGES[key])
+        object.__setattr__(self, "world", MappingProxyType(dict(self.world)))
         for key, value in self.world.items():
             if key not in HIDDEN_KEYS:
                 raise fail(f"world.{key}", value, "one of " + ", ".join(f"world.{k}" for k in HIDDEN_KEYS))
             number(f"world.{key}", value, **_RANGES[key])
-        low, high = np.rad2deg(self.motion.angles)
-        if not (low > 0.0 and high < 90.0):
-            raise fail(
-                "theta", self.theta, f"such that the block stays on its corner, in (0, 90) deg, not {low:g} to {high:g}"
-            )
+        swing = self.amplitude if self.reference == "sine" else 0.0
+        if not LOWEST <= self.theta - swing <= self.theta + swing <= 90.0 - LOWEST:
+            raise fail("amplitude", swing, f"such that the block stays on its corner about theta = {self.theta:g} deg")
 
     @property
     def path(self) -> Path:
@@ -178,8 +185,11 @@ class Scenario:
         Raises:
             ValueError: an unknown key or a value out of range; it is named.
         """
-        plain = {key: value for key, value in overrides.items() if not key.startswith("world")}
-        hidden = dict(overrides.get("world", {}))
+        plain = {key: value for key, value in overrides.items() if not key.startswith("world.") and key != "world"}
+        given = overrides.get("world", {})
+        if not isinstance(given, Mapping):
+            raise fail("world", given, 'a mapping, such as {"mu": 0.2}')
+        hidden = dict(given)
         hidden.update({key[6:]: value for key, value in overrides.items() if key.startswith("world.")})
         for key, value in plain.items():
             if key not in KEYS:

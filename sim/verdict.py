@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.controller.validate import number
 
 if TYPE_CHECKING:
     from pivoting.sim.monitor import Measures
@@ -31,6 +32,10 @@ class Limits:
     force_mismatch_rel: float = 0.05
     friction_use: float = 0.999
     settle_s: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            number(f"limits.{name}", value, at_least=0.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -92,6 +92,73 @@ def model_with(joints: str, extra: str = "", child: str = "") -> mujoco.MjModel:
     )
 
 
+def scene(geom: str = "", joint: str = "", body: str = "", extra: str = "") -> mujoco.MjModel:
+    """The 1 m block on a plane, with something added to its geom, its first joint, its body or the model."""
+    return mujoco.MjModel.from_xml_string(
+        f'<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1"/><body name="b" pos="0 0 1" {body}>'
+        f'<joint type="slide" axis="1 0 0" {joint}/><joint type="slide" axis="0 0 1"/>'
+        '<joint type="hinge" axis="0 1 0"/>'
+        f'<geom name="g" type="box" size=".5 .2 .5" {geom}/></body></worldbody>{extra}</mujoco>'
+    )
+
+
+PAIR = '<contact><pair geom1="floor" geom2="g" friction="0.05 0.05 0.005 0.0001 0.0001"/></contact>'
+
+
+def test_friction_of_an_explicit_pair() -> None:
+    assert attach(scene(extra=PAIR), body="b", contacts=[(-0.5, -0.5)]).controller.contacts[0].mu == 0.05
+
+
+@pytest.mark.parametrize(
+    ("model", "message"),
+    [
+        (scene(geom='condim="1"', extra="<default/>"), None),
+        (scene(geom='contype="0" conaffinity="0"'), "never touch"),
+        (scene(extra='<contact><exclude body1="world" body2="b"/></contact>'), "never touch"),
+        (scene(body='gravcomp="1"'), "gravcomp = 1"),
+        (scene(joint='stiffness="30"'), "stiffness = 30"),
+        (scene(joint='damping="2"'), "damping = 2"),
+        (scene(joint='range="-1 1" limited="true"'), "limited = 1"),
+        (scene(joint='armature="0.1"'), "armature = 0.1"),
+    ],
+)
+def test_a_model_with_other_forces_or_no_contact_is_refused(model: mujoco.MjModel, message: str | None) -> None:
+    if message is None:  # MuJoCo takes the larger condim, the plane's 3: there is friction
+        assert attach(model, body="b", contacts=[(-0.5, -0.5)]).controller.contacts[0].mu == 1.0
+        return
+    with pytest.raises(ModelError, match=message):
+        attach(model, body="b", contacts=[(-0.5, -0.5)])
+
+
+def test_frictionless_contact_is_refused() -> None:
+    model = scene()
+    model.geom_condim[:] = 1
+    with pytest.raises(ModelError, match="without friction"):
+        attach(model, body="b", contacts=[(-0.5, -0.5)])
+
+
+def test_a_support_that_moves_is_refused() -> None:
+    with pytest.raises(ModelError, match="support = 'g': it can move"):
+        attach(scene(), body="b", contacts=[(-0.5, -0.5)], support="g")
+
+
+def test_inertia_given_about_turned_axes() -> None:
+    """ipos and iquat of a body: the inertia about the plane's normal, against MuJoCo's own mass matrix."""
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><geom type="plane" size="1 1 1"/><body name="b" pos="0 0 1">'
+        '<inertial pos="0.1 0.02 -0.2" euler="20 50 -30" mass="1.5" diaginertia="0.3 0.2 0.15"/>'
+        '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/><joint type="hinge" axis="0 -1 0"/>'
+        '<geom type="box" size=".5 .2 .5"/></body></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    M = np.zeros((3, 3))
+    mujoco.mj_fullM(model, data, M)
+    body = attach(model, body="b", contacts=[(-0.5, 0.0, -0.5)]).body
+    assert body.inertia == pytest.approx(M[2, 2] - 1.5 * (0.1**2 + 0.2**2), rel=1e-9)
+    np.testing.assert_allclose(body.point([-0.5, 0.0, -0.5]), [-0.6, -0.3])
+
+
 SLIDES = '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>'
 HINGE = '<joint type="hinge" axis="0 1 0"/>'
 

@@ -29,7 +29,7 @@ def test_it_agrees_with_a_general_purpose_optimiser() -> None:
         assert solve(problem).objective <= end.fun * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("kind", ["wrench", "along", "outside", "scaled"])
+@pytest.mark.parametrize("kind", ["wrench", "along", "outside", "scaled", "idle"])
 def test_every_kind_of_error_shows(kind: str) -> None:
     rng = np.random.default_rng(5)
     for _ in range(300):
@@ -44,6 +44,11 @@ def test_every_kind_of_error_shows(kind: str) -> None:
             w = problem.required - problem.jacobian @ f
         elif kind == "outside":
             f = f + np.array([2.0 * problem.mu_planned[0] * f[1] + 0.01 * size, 0.0])
+            w = problem.required - problem.jacobian @ f
+        elif kind == "idle":  # the floor alone, where the optimum carries more: only the dual cone tells
+            if f[1] <= problem.f_min[0] + 0.01 * size:
+                continue
+            f = np.array([0.0, problem.f_min[0]])
             w = problem.required - problem.jacobian @ f
         else:
             w, f = 1.001 * w, 1.001 * f

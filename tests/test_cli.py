@@ -96,8 +96,10 @@ def test_a_diverged_run_is_still_json() -> None:
         (["run", "pivot-2d", "--set", "thet=3"], "thet = '3': must be a known key"),
         (["run", "pivot-2d", "--set", "theta=abc"], "theta = 'abc': must be a number"),
         (["run", "pivot-2d", "--set", "theta=nan"], "theta = nan: must be a finite number"),
-        (["run", "pivot-2d", "--set", "theta=120"], "theta = 120.0: must be a finite number > 0 and < 90 [deg]"),
+        (["run", "pivot-2d", "--set", "theta=120"], "theta = 120.0: must be a finite number >= 0.1 and <= 89.9 [deg]"),
         (["run", "pivot-2d", "--set", "mu=0"], "mu = 0.0: must be a finite number > 0"),
+        (["run", "pivot-2d", "--set", "world_mu=0.1"], "world_mu = '0.1': must be a known key"),
+        (["run", "pivot-2d", "--set", "world=3"], "world = '3': must be a mapping"),
         (["run", "pivot-2d", "--set", "theta"], "'theta': must be KEY=VALUE"),
         (["run", "pivot-2d", "--set", "world.law=static"], "world.law"),
         (["run", "pivot-2d", "--worlds", "0"], "'--worlds': 0 is not in the range"),
@@ -124,6 +126,9 @@ def test_out_that_is_a_file_is_refused_before_the_run(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "must be a folder" in done.stderr
     assert (tmp_path / "taken").read_text() == "mine"
+    below = pivoting("run", "balance-2d", "--out", str(tmp_path / "taken" / "sub"))
+    assert below.returncode == 2
+    assert "must be a folder that can be written to" in below.stderr
 
 
 def test_help_and_version() -> None:

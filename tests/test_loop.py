@@ -4,9 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from pivoting.controller import Motion, solve
-from pivoting.controller.references import Sampled
-from pivoting.sim import Run, assert_sticking, assert_tracking, simulate
+from pivoting.controller import Motion, WrenchController, solve
+from pivoting.controller.references import Constant, Sampled
+from pivoting.sim import SCENARIOS, Run, assert_sticking, assert_tracking, simulate
+from scipy.spatial.transform import Rotation
 
 
 def test_balance(shipped: Callable[[str], Run]) -> None:
@@ -129,8 +130,53 @@ def test_sine_and_other_sizes() -> None:
 
 
 def test_arrays_cannot_be_changed(shipped: Callable[[str], Run]) -> None:
-    with pytest.raises(ValueError, match="read-only"):
-        shipped("balance-2d").wrench[0, 0] = 0.0
+    run = shipped("balance-2d")
+    for name in ("wrench", "time", "theta", "slip", "corner", "friction_use", "control_us", "force_measured"):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(run, name)[0] = 0.0
+    with pytest.raises(TypeError, match="not support item assignment"):
+        SCENARIOS["incline-2d"].world["mu"] = 0.1  # type: ignore[index]
+
+
+def test_a_controller_of_ones_own_is_named_and_brings_its_own_settings(shipped: Callable[[str], Run]) -> None:
+    mine = shipped("balance-2d").attached.controller
+    run = simulate("balance-2d", controller=mine, seconds=0.6)
+    assert run.summary()["controller"] == "given"
+    assert run.summary()["limits"]["slip_m"] == 2e-5
+    with pytest.raises(ValueError, match=r"margin = 0.5.*the controller that is given has its own"):
+        simulate("balance-2d", controller=mine, margin=0.5)
+    two = WrenchController(mine.body, mine.contacts * 2, mine.law, (0.0, -10.0))
+    with pytest.raises(ValueError, match=r"controller = .*2 contacts.*one planar contact"):
+        simulate("balance-2d", controller=two)
+
+
+@pytest.mark.parametrize("incline", [1.0, 5.0])
+def test_what_is_measured_is_measured_from_the_worlds_table(incline: float) -> None:
+    """A table that the controller does not know of: the corner and the angle, from MuJoCo's poses alone."""
+    run = simulate("pivot-2d", seconds=1.0, world={"incline": incline}, spread=0.0)
+    turned = Rotation.from_quat(np.roll(run.quaternion[0], -1, axis=-1))
+    path = run.position[0] + turned.apply([-0.5, 0.0, -0.5])
+    tangent = np.array([np.cos(np.deg2rad(incline)), 0.0, np.sin(np.deg2rad(incline))])
+    np.testing.assert_allclose(run.slip[0], (path - path[0]) @ tangent, atol=1e-12)
+    edge = turned.apply([1.0, 0.0, 0.0])
+    np.testing.assert_allclose(run.theta[0], np.arctan2(edge[:, 2], edge[:, 0]) - np.deg2rad(incline), atol=1e-9)
+    assert run.measures.angle_error_rms_deg[0] == pytest.approx(incline, abs=0.2)
+    assert run.verdict == "fail"
+
+
+def test_steep_tables_either_way() -> None:
+    for incline in (-60.0, 60.0):
+        assert simulate("balance-2d", incline=incline, mu=2.0, seconds=0.6).verdict == "pass"
+
+
+def test_a_reference_that_starts_in_motion() -> None:
+    """The world starts with the reference's rate; and what kick is left does not ring on in the contact."""
+    run = simulate("balance-2d", reference="sine", seconds=3.0)
+    assert run.omega[0, 0] == pytest.approx(float(run.reference[1][0]))
+    assert run.verdict == "pass"
+    kicked = simulate("balance-2d", reference=Sampled(np.full(10, 0.5) + 1e-4 * (np.arange(10) == 4), 0.1), seconds=3.0)
+    late = kicked.force_measured[0, kicked.time[:-1] > 2.0, 0] - kicked.force[0, kicked.time[:-1] > 2.0, 0]
+    assert np.abs(late).max() < 1e-4
 
 
 @pytest.mark.parametrize(
@@ -141,11 +187,23 @@ def test_arrays_cannot_be_changed(shipped: Callable[[str], Run]) -> None:
         ({"worlds": 2.5}, "worlds = 2.5.*whole number"),
         ({"seed": -1}, "seed = -1.*>= 0"),
         ({"mass": float("nan")}, "mass = nan.*> 0"),
-        ({"theta": 0.0}, "theta = 0.0.*> 0"),
-        ({"theta": 90}, "theta = 90.0.*< 90"),
-        ({"theta_end": -5}, "theta_end = -5.*> 0"),
-        ({"reference": "sine", "theta": 5, "amplitude": 10}, "theta = 5.*stays on its corner"),
+        ({"theta": 0.0}, "theta = 0.0.*>= 0.1"),
+        ({"theta": 90}, "theta = 90.0.*<= 89.9"),
+        ({"theta_end": -5}, "theta_end = -5.*>= 0.1"),
+        ({"reference": "sine", "theta": 5, "amplitude": 10}, "amplitude = 10.*stays on its corner about theta = 5"),
         ({"mu": 0}, "mu = 0.0.*> 0"),
+        ({"gravity": 0.0}, "gravity = 0.0.*f_min"),
+        ({"theta": None}, "theta = None"),
+        ({"mu": True}, "mu = True"),
+        ({"name": 3}, "scenario = 3"),
+        ({"world": None}, "world = None.*mapping"),
+        ({"world_mu": 0.1}, "world_mu = 0.1.*known key"),
+        ({"limits": None}, "limits = None"),
+        ({"controller": "mine"}, "controller = 'mine'"),
+        ({"reference": np.array([0.5, 0.6])}, "reference = 'ndarray'.*Sampled"),
+        ({"reference": lambda t: (np.full(t.shape, np.nan), 0 * t, 0 * t)}, "reference = .*angle.*finite"),
+        ({"reference": lambda t: (0.5, 0.0, 0.0)}, "reference = .*shape"),
+        ({"reference": Constant(2.0)}, "reference = .*114.592"),
         ({"law": "magic"}, "law = 'magic'.*dynamic"),
         ({"reference": "spiral"}, "reference = 'spiral'.*arc"),
         ({"masss": 1.0}, "masss = 1.0.*known key"),

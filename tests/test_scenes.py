@@ -18,7 +18,7 @@ def test_each_opens_on_its_own_standing_on_its_corner(name: str) -> None:
     mujoco.mj_kinematics(model, data)
     R = data.xmat[1].reshape(3, 3)
     np.testing.assert_allclose(data.xpos[1] + R @ corner(model), 0.0, atol=1e-8)
-    assert (model.geom_solref[:, 0] == 2.0 * model.opt.timestep).all()
+    np.testing.assert_allclose(model.geom_solref[:, 0], 2.1 * model.opt.timestep)
 
 
 def test_the_notes_numbers_are_in_the_scene() -> None:
@@ -35,7 +35,7 @@ def test_changes_arrive_in_the_compiled_model() -> None:
     model = load(scene_path("pivot-2d"), changes).compile()
     body = read_body(model, "block", "table")
     assert model.opt.timestep == 0.002
-    assert (model.geom_solref[:, 0] == 0.004).all()
+    np.testing.assert_allclose(model.geom_solref[:, 0], 0.0042)
     assert (model.geom_solimp[:, :2] == 0.6).all()
     assert model.opt.impratio == 50.0
     assert (model.geom_friction[:, 0] == 0.7).all()
