@@ -7,7 +7,7 @@ settles at the depth delta with k delta = R_n f_n - c_n (1 - b h / 2); the const
 corner. So the material corner drifts along the table at
 
     - R_t f_t / b              creep under tangential load
-    + c_t (1 / b - h / 2)      rotation; nothing at b h = 2
+    + c_t (1 / b - h / 2)      rotation; nothing at b h = 2, where the row rings for ever
     + w delta / 2              the lever of the penetration
 
 and the contact opens where delta < 0: never by turning alone at b h = 2.

@@ -28,9 +28,9 @@ def test_rotation_drift() -> None:
 
 @pytest.mark.parametrize("name", ["pivot-2d", "snap-2d"])
 def test_what_is_left_at_the_shipped_settings(name: str) -> None:
-    """At b h = 2 the rotation term is nothing and the lever of the penetration remains; within 15 %."""
+    """At b h = 1.9 a twentieth of the rotation is left, and the lever of the penetration; within 10 %."""
     gap, slip = worst_gap(simulate(name, spread=0.0))
-    assert gap < 0.15 * slip
+    assert gap < 0.10 * slip
 
 
 def test_a_corner_opens_where_it_is_predicted_to() -> None:
