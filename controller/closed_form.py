@@ -12,21 +12,26 @@ SMALL = 1e-15  # relative optimality at which a candidate is taken without looki
 
 
 @njit(cache=True)
-def reduce(J, b, Q_w, Q_f, H, h):  # type: ignore[no-untyped-def]
-    """Write H = Q_f + J'Q_w J (n, n) and h = J'Q_w b (n,) of the problem in f alone."""
+def reduce(J, b, Q_w, Q_f, H, h, row):  # type: ignore[no-untyped-def]
+    """Write H = Q_f + J'Q_w J (n, n) and h = J'Q_w b (n,) of the problem in f alone; row (n,) is scratch."""
     nw, n = J.shape
     for j in range(n):
         h[j] = 0.0
         for i in range(j + 1):
             H[i, j] = 0.5 * (Q_f[i, j] + Q_f[j, i])
-    for j in range(n):
-        for p in range(nw):
-            weighted = 0.0  # (Q_w J)[p, j]
-            for q in range(nw):
-                weighted += Q_w[p, q] * J[q, j]
-            h[j] += weighted * b[p]
-            for i in range(j + 1):
-                H[i, j] += J[p, i] * weighted
+    for p in range(nw):
+        for j in range(n):
+            row[j] = 0.0
+        for q in range(nw):  # row p of Q_w J, along rows of J: contiguous, so that it vectorises
+            weight = Q_w[p, q]
+            for j in range(n):
+                row[j] += weight * J[q, j]
+        for j in range(n):
+            h[j] += row[j] * b[p]
+        for i in range(n):
+            left = J[p, i]
+            for j in range(i, n):
+                H[i, j] += left * row[j]
     for j in range(n):
         for i in range(j):
             H[j, i] = H[i, j]

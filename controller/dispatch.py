@@ -24,7 +24,7 @@ def smallest_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-u
     K = mu.shape[0]
     dim = f.shape[0] // K
     H, h = work.H, work.h
-    reduce(J, b, Q_w, Q_f, H, h)
+    reduce(J, b, Q_w, Q_f, H, h, work.x)
     if K == 1 and dim == 2:
         planar_force(H, h, mu[0], f_min[0], f)
         balancing_wrench(J, b, f, w)

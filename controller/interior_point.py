@@ -41,16 +41,13 @@ class Work(NamedTuple):
     tangent: np.ndarray  # (n, d)
     start: np.ndarray  # (K + 1,) int
     piece: np.ndarray  # (K,) int
-    s: np.ndarray  # (K, d): slack of the cones, (mu f_n, f_t, f_o)
-    y: np.ndarray  # (K, d): its multiplier
-    bar: np.ndarray  # (K, d): scaling point
-    lam: np.ndarray  # (K, d): scaled slack = scaled multiplier
-    ds: np.ndarray  # (K, d): steps
-    dy: np.ndarray  # (K, d)
-    c: np.ndarray  # (K, d): corrector
-    eta: np.ndarray  # (K,)
+    s: np.ndarray  # (K, 3): slack of the cones, (mu f_n, f_t, f_o); f_o = 0 in the plane
+    y: np.ndarray  # (K, 3): its multiplier
+    bar: np.ndarray  # (K, 4): scaling point and eta, see `_scale`
+    lam: np.ndarray  # (K, 4): scaled slack, which is also the scaled multiplier, and its determinant
+    u: np.ndarray  # (K, 3): scaled step of the slack
+    c: np.ndarray  # (K, 3): scaled corrector
     floor: np.ndarray  # (K, 5): slack p = f_n - f_min, its multiplier q, dp, dq, corrector
-    total: np.ndarray  # (1,): the gap s'y + p q
 
 
 @njit(cache=True)
@@ -60,17 +57,17 @@ def workspace(nw, K, dim):  # type: ignore[no-untyped-def]
     return Work(
         np.empty((n, n)), np.empty(n), np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n), np.empty(n),
         np.empty(n), np.empty(n), np.empty(nw), np.empty(nw), np.zeros((n, dim)), np.empty(K + 1, np.int64), np.empty(K, np.int64),
-        np.empty((K, dim)), np.empty((K, dim)), np.empty((K, dim)), np.empty((K, dim)), np.empty((K, dim)),
-        np.empty((K, dim)), np.empty((K, dim)), np.empty(K), np.zeros((K, 5)), np.empty(1),
+        np.zeros((K, 3)), np.zeros((K, 3)), np.empty((K, 4)), np.empty((K, 4)), np.empty((K, 3)),
+        np.empty((K, 3)), np.zeros((K, 5)),
     )  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy")
 def contact_forces(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-untyped-def]
     """Write the optimum into f (n,) and w (nw,), given finite H and h in `work`; return its relative KKT residual."""
-    n, K = f.shape[0], mu.shape[0]
-    dim = n // K
-    H, h, M, x, g, now, floor = work.H, work.h, work.M, work.x, work.g, work.now, work.floor
+    n = f.shape[0]
+    dim = n // mu.shape[0]
+    H, h, M, x, g, now = work.H, work.h, work.M, work.x, work.g, work.now
     if _nothing_pulls(h, mu, f_min, dim):  # f = 0 is optimal, exactly
         f[:] = 0.0
         balancing_wrench(J, b, f, w)
@@ -88,33 +85,26 @@ def contact_forces(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-un
     cones = _start(H, h, mu, f_min, dim, work)
     goal = FIRST_GOAL
     for _ in range(ITERATIONS):
-        gap, size = _measure(mu, f_min, dim, work)
-        if gap <= goal * size:
-            _guess(mu, f_min, dim, work)
+        gap, left, size = _measure(mu, f_min, dim, work)
+        if gap + left <= goal * size:
+            _guess(mu, f_min, work)
             best = _try(J, b, Q_w, Q_f, mu, f_min, dim, True, f, w, best, work)
             if best <= EXACT or goal < 1e-13:
                 break
             goal *= 1e-2
-        _scale(mu, f_min, dim, work)
         M[:] = H
-        _add_scaling(mu, f_min, dim, work)
+        _scale(mu, f_min, dim, work)
         factor(M, n)
         for i in range(n):
             x[i] = -g[i]
         solve_factored(M, x, n)
-        alpha = _steps(mu, f_min, dim, False, work)
-        _correct(mu, f_min, dim, (1.0 - alpha) ** 3 * work.total[0] / cones, work)
+        alpha = min(1.0, _step_length(mu, f_min, dim, False, work))
+        _correct(mu, f_min, dim, (1.0 - alpha) ** 3 * gap / cones, work)
         solve_factored(M, x, n)
-        alpha = 0.99 * _steps(mu, f_min, dim, True, work)
+        alpha = 0.99 * _step_length(mu, f_min, dim, True, work)
         if not alpha > 1e-12:  # also when nan
             break
-        alpha = min(1.0, alpha)
-        for i in range(n):
-            now[i] += alpha * x[i]
-        for i in range(K):
-            for a in range(dim):
-                work.y[i, a] += alpha * work.dy[i, a]
-            floor[i, Q] += alpha * floor[i, DQ]
+        _advance(f_min, min(1.0, alpha), work)
     if best > EXACT:
         best = _try(J, b, Q_w, Q_f, mu, f_min, dim, False, f, w, best, work)
     return best
@@ -164,10 +154,10 @@ def _start(H, h, mu, f_min, dim, work):  # type: ignore[no-untyped-def]
 
     Returns the number of cones.
     """
-    n, K = h.shape[0], mu.shape[0]
-    now, floor = work.now, work.floor
+    K = mu.shape[0]
+    now, s, y, floor = work.now, work.s, work.y, work.floor
     largest = 0.0
-    for i in range(n):
+    for i in range(K * dim):
         largest = max(largest, abs(now[i]))
     for i in range(K):
         largest = max(largest, f_min[i])
@@ -178,23 +168,20 @@ def _start(H, h, mu, f_min, dim, work):  # type: ignore[no-untyped-def]
         shrink = min(1.0, 0.5 * mu[i] * now[normal] / size) if size > 0.0 else 1.0
         for p in range(i * dim, normal):
             now[p] *= shrink
-    work.y[:] = 0.0
+    y[:] = 0.0
+    s[:] = 0.0
     floor[:] = 0.0
     _measure(mu, f_min, dim, work)
     cones = 0
     level = 0.0
-    for i in range(n):
+    for i in range(K * dim):
         level += abs(work.g[i] * now[i])
     for i in range(K):
         cones += 2 if f_min[i] > 0.0 else 1
     level /= cones
     for i in range(K):  # s o y = level e, p q = level
-        slack = 0.0
-        for a in range(1, dim):
-            slack += work.s[i, a] ** 2
-        slack = work.s[i, 0] ** 2 - slack
-        for a in range(dim):
-            work.y[i, a] = (level if a == 0 else -level) * work.s[i, a] / slack
+        scale = level / (s[i, 0] ** 2 - s[i, 1] ** 2 - s[i, 2] ** 2)
+        y[i, 0], y[i, 1], y[i, 2] = scale * s[i, 0], -scale * s[i, 1], -scale * s[i, 2]
         if f_min[i] > 0.0:
             floor[i, Q] = level / floor[i, P]
     return cones
@@ -202,9 +189,9 @@ def _start(H, h, mu, f_min, dim, work):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _measure(mu, f_min, dim, work):  # type: ignore[no-untyped-def]
-    """Slacks and gradient of the iterate; (its gap plus what is left of the dual residual, the size of both)."""
+    """Slacks and gradient of the iterate; its gap, what is left of the dual residual, and the size of both."""
     H, h, now, g, s, y, floor = work.H, work.h, work.now, work.g, work.s, work.y, work.floor
-    n, K = h.shape[0], mu.shape[0]
+    n = h.shape[0]
     for i in range(n):
         g[i] = 0.0
     for j in range(n):
@@ -215,177 +202,170 @@ def _measure(mu, f_min, dim, work):  # type: ignore[no-untyped-def]
     for i in range(n):
         size += abs(now[i]) * (abs(g[i]) + abs(h[i]))
         g[i] -= h[i]
-    for i in range(K):
-        normal = (i + 1) * dim - 1
-        s[i, 0] = mu[i] * now[normal]
-        gap += s[i, 0] * y[i, 0]
-        for a in range(1, dim):
-            p = i * dim + a - 1
-            s[i, a] = now[p]
-            gap += s[i, a] * y[i, a]
-            left += abs(now[p] * (g[p] - y[i, a]))
+    for i in range(mu.shape[0]):
+        t, e = i * dim, (i + 1) * dim - 1
+        s[i, 0], s[i, 1] = mu[i] * now[e], now[t]
+        left += abs(now[t] * (g[t] - y[i, 1])) + abs(now[e] * (g[e] - mu[i] * y[i, 0] - floor[i, Q]))
+        if dim == 3:
+            s[i, 2] = now[t + 1]
+            left += abs(now[t + 1] * (g[t + 1] - y[i, 2]))
+        gap += s[i, 0] * y[i, 0] + s[i, 1] * y[i, 1] + s[i, 2] * y[i, 2]
         if f_min[i] > 0.0:
-            floor[i, P] = now[normal] - f_min[i]
+            floor[i, P] = now[e] - f_min[i]
             gap += floor[i, P] * floor[i, Q]
-        left += abs(now[normal] * (g[normal] - mu[i] * y[i, 0] - floor[i, Q]))
-    work.total[0] = gap
-    return gap + left, size
+    return gap, left, size
 
 
 @njit(cache=True, error_model="numpy")
-def _margin(v, i, dim):  # type: ignore[no-untyped-def]
-    """v_0 - |v_1|, v_0 + |v_1| of row i: the spectral values of a cone's point."""
-    size = np.hypot(v[i, 1], v[i, 2]) if dim == 3 else abs(v[i, 1])
-    return v[i, 0] - size, v[i, 0] + size
-
-
-@njit(cache=True, error_model="numpy")
-def _guess(mu, f_min, dim, work):  # type: ignore[no-untyped-def]
+def _guess(mu, f_min, work):  # type: ignore[no-untyped-def]
     """The piece each contact is on: of slack and multiplier, the one that is not small."""
-    K = mu.shape[0]
+    s, y, floor = work.s, work.y, work.floor
     size_s = size_y = 0.0
-    for i in range(K):
-        size_s = max(size_s, work.s[i, 0])
-        size_y = max(size_y, max(work.y[i, 0], work.floor[i, Q]))
-    for i in range(K):
-        s_low, s_high = _margin(work.s, i, dim)
-        y_low, y_high = _margin(work.y, i, dim)
-        low = f_min[i] > 0.0 and work.floor[i, P] * mu[i] * size_y < work.floor[i, Q] * size_s
-        if s_low * size_y > y_high * size_s:
+    for i in range(mu.shape[0]):
+        size_s = max(size_s, s[i, 0])
+        size_y = max(size_y, max(y[i, 0], floor[i, Q]))
+    for i in range(mu.shape[0]):
+        norm_s, norm_y = np.hypot(s[i, 1], s[i, 2]), np.hypot(y[i, 1], y[i, 2])
+        low = f_min[i] > 0.0 and floor[i, P] * mu[i] * size_y < floor[i, Q] * size_s
+        if (s[i, 0] - norm_s) * size_y > (y[i, 0] + norm_y) * size_s:
             work.piece[i] = FLOOR if low else INSIDE
-        elif f_min[i] == 0.0 and s_high * size_y < y_low * size_s:
+        elif f_min[i] == 0.0 and (s[i, 0] + norm_s) * size_y < (y[i, 0] - norm_y) * size_s:
             work.piece[i] = APEX
         else:
             work.piece[i] = RIM if low else EDGE
 
 
 @njit(cache=True, error_model="numpy")
+def _determinant(v0, v1, v2):  # type: ignore[no-untyped-def]
+    """v_0^2 - |v_1|^2 without the cancellation of the squares."""
+    size = np.sqrt(v1 * v1 + v2 * v2)
+    return (v0 - size) * (v0 + size)
+
+
+@njit(cache=True, error_model="numpy")
+def _unscale(b0, b1, b2, eta, v0, v1, v2):  # type: ignore[no-untyped-def]
+    """W^-1 v for the scaling point b."""
+    dot = b1 * v1 + b2 * v2
+    slope = dot / (1.0 + b0) - v0
+    inverse = 1.0 / eta
+    return (b0 * v0 - dot) * inverse, (v1 + slope * b1) * inverse, (v2 + slope * b2) * inverse
+
+
+@njit(cache=True, error_model="numpy")
 def _scale(mu, f_min, dim, work):  # type: ignore[no-untyped-def]
-    """The Nesterov-Todd scaling of every cone: W = eta (2 bar bar' - J)^1/2 with W y = W^-1 s = lam."""
-    s, y, bar = work.s, work.y, work.bar
+    """The Nesterov-Todd scaling W y = W^-1 s = lam of every cone, and M += A'W^-2 A block by block.
+
+    W^2 = eta^2 (2 b b' - diag(1, -1, -1)), so W^-2 = (2 v v' - diag(1, -1, -1)) / eta^2 with v = (b_0, -b_1, -b_2).
+    """
+    M, s, y, bar, lam, floor = work.M, work.s, work.y, work.bar, work.lam, work.floor
     for i in range(mu.shape[0]):
-        low, high = _margin(s, i, dim)
-        size_s = np.sqrt(low * high)
-        low, high = _margin(y, i, dim)
-        size_y = np.sqrt(low * high)
-        dot = 0.0
-        for a in range(dim):
-            dot += s[i, a] * y[i, a]
-        gamma = np.sqrt(0.5 * (1.0 + dot / (size_s * size_y)))
-        for a in range(dim):
-            other = y[i, a] / size_y
-            bar[i, a] = 0.5 / gamma * (s[i, a] / size_s + (other if a == 0 else -other))
-        work.eta[i] = np.sqrt(size_s / size_y)
-        _unscale(bar, work.eta[i], s, work.lam, i, dim)
-
-
-@njit(cache=True, error_model="numpy")
-def _unscale(bar, eta, v, out, i, dim):  # type: ignore[no-untyped-def]
-    """Row i of out = W^-1 v; in place too."""
-    dot = 0.0
-    for a in range(1, dim):
-        dot += bar[i, a] * v[i, a]
-    first = v[i, 0]
-    slope = (dot / (1.0 + bar[i, 0]) - first) / eta
-    for a in range(1, dim):
-        out[i, a] = v[i, a] / eta + slope * bar[i, a]
-    out[i, 0] = (bar[i, 0] * first - dot) / eta
-
-
-@njit(cache=True, error_model="numpy")
-def _add_scaling(mu, f_min, dim, work):  # type: ignore[no-untyped-def]
-    """M += A'W^-2 A, block by block: W^-2 = (2 v v' - diag(1, -1, -1)) / eta^2 with v = (bar_0, -bar_1)."""
-    M, bar, floor = work.M, work.bar, work.floor
-    for i in range(mu.shape[0]):
-        at, n = i * dim, (i + 1) * dim - 1
-        scale = 1.0 / (work.eta[i] * work.eta[i])
-        head = mu[i] * bar[i, 0]
-        for a in range(dim - 1):
-            for c in range(a, dim - 1):
-                M[at + a, at + c] += 2.0 * scale * bar[i, a + 1] * bar[i, c + 1]
-            M[at + a, at + a] += scale
-            M[at + a, n] -= 2.0 * scale * bar[i, a + 1] * head
-        M[n, n] += scale * (2.0 * head * head - mu[i] * mu[i])
+        s0, s1, s2, y0, y1, y2 = s[i, 0], s[i, 1], s[i, 2], y[i, 0], y[i, 1], y[i, 2]
+        size_s, size_y = np.sqrt(_determinant(s0, s1, s2)), np.sqrt(_determinant(y0, y1, y2))
+        eta2 = size_s / size_y
+        # (s / size_s + J y / size_y) / (2 gamma)
+        half = 0.5 / np.sqrt(0.5 + 0.5 * (s0 * y0 + s1 * y1 + s2 * y2) / (size_s * size_y))
+        in_s, in_y = half / size_s, half / size_y
+        b0, b1, b2 = s0 * in_s + y0 * in_y, s1 * in_s - y1 * in_y, s2 * in_s - y2 * in_y
+        eta = np.sqrt(eta2)
+        l0, l1, l2 = _unscale(b0, b1, b2, eta, s0, s1, s2)
+        bar[i, 0], bar[i, 1], bar[i, 2], bar[i, 3] = b0, b1, b2, eta
+        lam[i, 0], lam[i, 1], lam[i, 2], lam[i, 3] = l0, l1, l2, size_s * size_y
+        t, e = i * dim, (i + 1) * dim - 1
+        scale = 1.0 / eta2
+        head, double = mu[i] * b0, 2.0 * scale
+        M[t, t] += scale + double * b1 * b1
+        M[t, e] -= double * b1 * head
+        if dim == 3:
+            M[t, t + 1] += double * b1 * b2
+            M[t + 1, t + 1] += scale + double * b2 * b2
+            M[t + 1, e] -= double * b2 * head
+        M[e, e] += double * head * head - scale * mu[i] * mu[i]
         if f_min[i] > 0.0:
-            M[n, n] += floor[i, Q] / floor[i, P]
+            M[e, e] += floor[i, Q] / floor[i, P]
 
 
 @njit(cache=True, error_model="numpy")
-def _steps(mu, f_min, dim, corrected, work):  # type: ignore[no-untyped-def]
-    """The steps of slacks and multipliers that belong to the step x of f; the length up to the first boundary (<= 2)."""
-    x, y, ds, dy, bar, c, floor = work.x, work.y, work.ds, work.dy, work.bar, work.c, work.floor
+def _step_length(mu, f_min, dim, corrected, work):  # type: ignore[no-untyped-def]
+    """The steps that belong to the step x of f, and how far (<= 2) they may be followed to the first boundary.
+
+    u = W^-1 ds and W dy = c - lam - u, with c = 0 in the predictor, whose length is only a measure and is taken in the
+    scaled cones; the corrector's is taken in the cones themselves and dy is written into c.
+    """
+    x, s, y, bar, lam, u, c, floor = work.x, work.s, work.y, work.bar, work.lam, work.u, work.c, work.floor
     alpha = 2.0
     for i in range(mu.shape[0]):
-        n = (i + 1) * dim - 1
-        eta = work.eta[i]
-        ds[i, 0] = mu[i] * x[n]
-        for a in range(1, dim):
-            ds[i, a] = x[i * dim + a - 1]
-        dot = -bar[i, 0] * ds[i, 0]  # W^-2 ds = (2 v (v'ds) - J ds) / eta^2
-        for a in range(1, dim):
-            dot += bar[i, a] * ds[i, a]
-        scale = 1.0 / (eta * eta)
-        dy[i, 0] = -scale * (-2.0 * dot * bar[i, 0] - ds[i, 0]) - y[i, 0]
-        for a in range(1, dim):
-            dy[i, a] = -scale * (2.0 * dot * bar[i, a] + ds[i, a]) - y[i, a]
+        t, e = i * dim, (i + 1) * dim - 1
+        s0, s1, s2 = mu[i] * x[e], x[t], x[t + 1] if dim == 3 else 0.0
+        u0, u1, u2 = _unscale(bar[i, 0], bar[i, 1], bar[i, 2], bar[i, 3], s0, s1, s2)
+        l0, l1, l2 = lam[i, 0], lam[i, 1], lam[i, 2]
         if corrected:
-            for a in range(dim):
-                dy[i, a] += c[i, a]
-        alpha = min(alpha, min(_reach(work.s, ds, i, dim), _reach(y, dy, i, dim)))
+            y0, y1, y2 = _unscale(
+                bar[i, 0], bar[i, 1], bar[i, 2], bar[i, 3], c[i, 0] - u0, c[i, 1] - u1, c[i, 2] - u2
+            )
+            y0, y1, y2 = y0 - y[i, 0], y1 - y[i, 1], y2 - y[i, 2]  # W^-1 lam = y: take it exactly
+            c[i, 0], c[i, 1], c[i, 2] = y0, y1, y2
+            alpha = min(alpha, _reach(s[i, 0], s[i, 1], s[i, 2], s0, s1, s2))
+            alpha = min(alpha, _reach(y[i, 0], y[i, 1], y[i, 2], y0, y1, y2))
+        else:
+            u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
+            alpha = min(alpha, _reach(l0, l1, l2, u0, u1, u2))
+            alpha = min(alpha, _reach(l0, l1, l2, -l0 - u0, -l1 - u1, -l2 - u2))
         if f_min[i] > 0.0:
-            floor[i, DP] = x[n]
-            floor[i, DQ] = -floor[i, Q] * (1.0 + x[n] / floor[i, P])
+            dp = x[e]
+            dq = -floor[i, Q] * (1.0 + dp / floor[i, P])
             if corrected:
-                floor[i, DQ] += floor[i, C]
-            if floor[i, DP] < 0.0:
-                alpha = min(alpha, -floor[i, P] / floor[i, DP])
-            if floor[i, DQ] < 0.0:
-                alpha = min(alpha, -floor[i, Q] / floor[i, DQ])
-    return alpha if corrected else min(alpha, 1.0)
+                dq += floor[i, C]
+            floor[i, DP], floor[i, DQ] = dp, dq
+            if dp < 0.0:
+                alpha = min(alpha, -floor[i, P] / dp)
+            if dq < 0.0:
+                alpha = min(alpha, -floor[i, Q] / dq)
+    return alpha
 
 
 @njit(cache=True, error_model="numpy")
-def _reach(v, dv, i, dim):  # type: ignore[no-untyped-def]
-    """The largest t <= 2 with v + t dv in the second-order cone, v inside: the first root of a quadratic."""
-    low, high = _margin(v, i, dim)
-    inside = low * high
-    a, half = dv[i, 0] * dv[i, 0], v[i, 0] * dv[i, 0]
-    for p in range(1, dim):
-        a -= dv[i, p] * dv[i, p]
-        half -= v[i, p] * dv[i, p]
-    root = half * half - a * inside
+def _reach(v0, v1, v2, d0, d1, d2):  # type: ignore[no-untyped-def]
+    """The largest t <= 2 with v + t d in the second-order cone, v inside: the first root of a quadratic."""
+    inside = _determinant(v0, v1, v2)
+    half = v0 * d0 - v1 * d1 - v2 * d2
+    root = half * half - _determinant(d0, d1, d2) * inside
     if root < 0.0:
         return 2.0
     slope = np.sqrt(root) - half
-    return min(2.0, inside / slope) if slope > 0.0 else 2.0
+    return inside / slope if slope > 0.5 * inside else 2.0
 
 
 @njit(cache=True, error_model="numpy")
 def _correct(mu, f_min, dim, target, work):  # type: ignore[no-untyped-def]
-    """From the predictor's steps: c = W^-1 (lam \\ (target e - (W^-1 ds) o (W dy))), and x = -g + A'c."""
-    x, g, ds, dy, lam, c, bar, floor = work.x, work.g, work.ds, work.dy, work.lam, work.c, work.bar, work.floor
+    """From the predictor's steps: c = lam \ (target e - (W^-1 ds) o (W dy)), and x = -g + A'W^-1 c."""
+    x, g, u, lam, c, bar, floor = work.x, work.g, work.u, work.lam, work.c, work.bar, work.floor
     for i in range(mu.shape[0]):
-        at, n = i * dim, (i + 1) * dim - 1
-        # W dy = -lam - W^-1 ds in the predictor, so that one scaled step is enough.
-        _unscale(bar, work.eta[i], ds, c, i, dim)
-        head = target
-        dot = norm = 0.0
-        first, second = c[i, 0], -lam[i, 0] - c[i, 0]
-        for a in range(dim):
-            head += c[i, a] * (lam[i, a] + c[i, a])
-        for a in range(1, dim):
-            u = c[i, a]
-            dy[i, a] = -(first * (-lam[i, a] - u) + second * u)  # dy is free: the corrector writes it anew
-            dot += lam[i, a] * dy[i, a]
-            norm += lam[i, a] * lam[i, a]
-        low, high = _margin(lam, i, dim)
-        c[i, 0] = (lam[i, 0] * head - dot) / (low * high)
-        for a in range(1, dim):
-            c[i, a] = (dy[i, a] - c[i, 0] * lam[i, a]) / lam[i, 0]
-        _unscale(bar, work.eta[i], c, c, i, dim)
-        for a in range(1, dim):
-            x[at + a - 1] = c[i, a] - g[at + a - 1]
-        x[n] = mu[i] * c[i, 0] - g[n]
+        t, e = i * dim, (i + 1) * dim - 1
+        l0, l1, l2 = lam[i, 0], lam[i, 1], lam[i, 2]
+        u0, u1, u2 = u[i, 0], u[i, 1], u[i, 2]
+        v0, v1, v2 = -l0 - u0, -l1 - u1, -l2 - u2
+        d0 = target - u0 * v0 - u1 * v1 - u2 * v2
+        d1, d2 = -u0 * v1 - v0 * u1, -u0 * v2 - v0 * u2
+        c0 = (l0 * d0 - l1 * d1 - l2 * d2) / lam[i, 3]
+        inverse = 1.0 / l0
+        c1, c2 = (d1 - c0 * l1) * inverse, (d2 - c0 * l2) * inverse
+        c[i, 0], c[i, 1], c[i, 2] = c0, c1, c2
+        c0, c1, c2 = _unscale(bar[i, 0], bar[i, 1], bar[i, 2], bar[i, 3], c0, c1, c2)
+        x[e], x[t] = mu[i] * c0 - g[e], c1 - g[t]
+        if dim == 3:
+            x[t + 1] = c2 - g[t + 1]
         if f_min[i] > 0.0:
             floor[i, C] = (target - floor[i, DP] * floor[i, DQ]) / floor[i, P]
-            x[n] += floor[i, C]
+            x[e] += floor[i, C]
+
+
+@njit(cache=True, error_model="numpy")
+def _advance(f_min, alpha, work):  # type: ignore[no-untyped-def]
+    """Follow the step: f, and the multipliers; the slacks are functions of f."""
+    for i in range(work.x.shape[0]):
+        work.now[i] += alpha * work.x[i]
+    for i in range(f_min.shape[0]):
+        for a in range(3):
+            work.y[i, a] += alpha * work.c[i, a]
+        if f_min[i] > 0.0:
+            work.floor[i, Q] += alpha * work.floor[i, DQ]
