@@ -2,7 +2,6 @@
 
 import numpy as np
 from numba import njit
-
 from pivoting.controller.certificate import kkt_residual
 from pivoting.controller.closed_form import balancing_wrench, planar_force, reduce
 from pivoting.controller.interior_point import EXACT, contact_forces

@@ -2,14 +2,13 @@
 
 min 1/2 f'H f - h'f  s.t.  s_i = (mu f_n, f_t, f_o) in the second-order cone and f_n >= f_min, contact by contact.
 Nesterov-Todd scaling and Mehrotra's predictor and corrector (Vandenberghe, "The CVXOPT linear and quadratic cone
-program solvers", 2010), with s a function of f, so that every iterate is strictly feasible. A floor of 0 is no constraint.
+program solvers", 2010), with s a function of f: every iterate is strictly feasible. A floor of 0 is no constraint.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-
 from pivoting.controller.certificate import kkt_residual
 from pivoting.controller.closed_form import balancing_wrench
 from pivoting.controller.dense import factor, solve_factored
@@ -56,8 +55,8 @@ def workspace(nw, K, dim):  # type: ignore[no-untyped-def]
     n = K * dim
     return Work(
         np.empty((n, n)), np.empty(n), np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n), np.empty(n),
-        np.empty(n), np.empty(n), np.empty(nw), np.empty(nw), np.zeros((n, dim)), np.empty(K + 1, np.int64), np.empty(K, np.int64),
-        np.zeros((K, 3)), np.zeros((K, 3)), np.empty((K, 4)), np.empty((K, 4)), np.empty((K, 3)),
+        np.empty(n), np.empty(n), np.empty(nw), np.empty(nw), np.zeros((n, dim)), np.empty(K + 1, np.int64),
+        np.empty(K, np.int64), np.zeros((K, 3)), np.zeros((K, 3)), np.empty((K, 4)), np.empty((K, 4)), np.empty((K, 3)),
         np.empty((K, 3)), np.zeros((K, 5)),
     )  # fmt: skip
 
@@ -112,7 +111,7 @@ def contact_forces(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-un
 
 @njit(cache=True, error_model="numpy")
 def _try(J, b, Q_w, Q_f, mu, f_min, dim, polished, f, w, best, work):  # type: ignore[no-untyped-def]
-    """Polish the iterate, or take it as it is; keep it in f and w if its certificate is the better one. The residual."""
+    """Polish the iterate, or take it as it is; keep it in f and w if its certificate is the better one."""
     trial_f, trial_w = work.trial_f, work.trial_w
     trial_f[:] = work.now
     balancing_wrench(J, b, trial_f, trial_w)
@@ -299,9 +298,7 @@ def _step_length(mu, f_min, dim, corrected, work):  # type: ignore[no-untyped-de
         u0, u1, u2 = _unscale(bar[i, 0], bar[i, 1], bar[i, 2], bar[i, 3], s0, s1, s2)
         l0, l1, l2 = lam[i, 0], lam[i, 1], lam[i, 2]
         if corrected:
-            y0, y1, y2 = _unscale(
-                bar[i, 0], bar[i, 1], bar[i, 2], bar[i, 3], c[i, 0] - u0, c[i, 1] - u1, c[i, 2] - u2
-            )
+            y0, y1, y2 = _unscale(bar[i, 0], bar[i, 1], bar[i, 2], bar[i, 3], c[i, 0] - u0, c[i, 1] - u1, c[i, 2] - u2)
             y0, y1, y2 = y0 - y[i, 0], y1 - y[i, 1], y2 - y[i, 2]  # W^-1 lam = y: take it exactly
             c[i, 0], c[i, 1], c[i, 2] = y0, y1, y2
             alpha = min(alpha, _reach(s[i, 0], s[i, 1], s[i, 2], s0, s1, s2))
@@ -337,7 +334,7 @@ def _reach(v0, v1, v2, d0, d1, d2):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _correct(mu, f_min, dim, target, work):  # type: ignore[no-untyped-def]
-    """From the predictor's steps: c = lam \ (target e - (W^-1 ds) o (W dy)), and x = -g + A'W^-1 c."""
+    r"""From the predictor's steps: c = lam \ (target e - (W^-1 ds) o (W dy)), and x = -g + A'W^-1 c."""
     x, g, u, lam, c, bar, floor = work.x, work.g, work.u, work.lam, work.c, work.bar, work.floor
     for i in range(mu.shape[0]):
         t, e = i * dim, (i + 1) * dim - 1

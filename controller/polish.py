@@ -1,13 +1,12 @@
 """The polish: Newton on the optimality conditions once it is known which piece of its cone each contact is on.
 
 On its piece a contact force is a smooth function of its coordinates: (f_t, f_o, f_n) inside, (f_n, arc) on the edge
-f = f_n (mu u, 1), (f_t, f_o) on the floor, the arc on the floor's rim, nothing at the apex. In the plane u = +-1 and there
-are no arcs. Newton then converges quadratically to a point whose certificate is a few units of rounding.
+f = f_n (mu u, 1), (f_t, f_o) on the floor, the arc on the floor's rim, nothing at the apex. In the plane u = +-1 and
+there are no arcs. Newton then converges quadratically to a point whose certificate is a few units of rounding.
 """
 
 import numpy as np
 from numba import njit
-
 from pivoting.controller.dense import factor, solve_factored
 from pivoting.controller.spatial_form import APEX, EDGE, FLOOR, INSIDE, RIM
 
@@ -46,7 +45,6 @@ def polish(J, Q_w, Q_f, H, mu, f_min, dim, piece, f, w, work):  # type: ignore[n
         H: (n, n) = Q_f + J'Q_w J, see `reduce`.
         work: `Work`; M, x, z, pull, tangent, start and moved are used.
     """
-    nw, n = J.shape
     K = mu.shape[0]
     M, x, z, tangent, start, moved = work.M, work.x, work.z, work.tangent, work.start, work.moved
     for i in range(K):
@@ -116,7 +114,7 @@ def _tangents(mu, dim, piece, at, f, tangent):  # type: ignore[no-untyped-def]
     n = at + dim - 1
     if piece == APEX:
         return 0
-    if piece == INSIDE or piece == FLOOR:
+    if piece in (INSIDE, FLOOR):
         m = dim if piece == INSIDE else dim - 1
         for p in range(dim):
             for q in range(m):
@@ -140,7 +138,7 @@ def _move(mu, f_min, dim, piece, i, first, x, tangent, f):  # type: ignore[no-un
     at, n, kind = i * dim, i * dim + dim - 1, piece[i]
     if kind == APEX or (kind == RIM and dim == 2):
         return False
-    if kind == INSIDE or kind == FLOOR:
+    if kind in (INSIDE, FLOOR):
         for p in range(dim if kind == INSIDE else dim - 1):
             f[at + p] += x[first + p]
     else:
@@ -159,19 +157,19 @@ def _land(mu, f_min, dim, piece, i, force):  # type: ignore[no-untyped-def]
     """Put a force (dim,) exactly on its piece; True where that is not the piece it was on, which it left."""
     kind, n = piece[i], dim - 1
     size = np.hypot(force[0], force[1]) if dim == 3 else abs(force[0])
-    if (kind == INSIDE or kind == EDGE) and force[n] <= f_min:
+    if kind in (INSIDE, EDGE) and force[n] <= f_min:
         kind = APEX if f_min == 0.0 else RIM if kind == EDGE else FLOOR
     if kind == INSIDE and size > mu * force[n]:
         kind = EDGE
     elif kind == FLOOR and size > mu * f_min:
         kind = RIM
-    elif (kind == EDGE or kind == RIM) and size == 0.0:  # it has no direction to keep
+    elif kind in (EDGE, RIM) and size == 0.0:  # it has no direction to keep
         kind = INSIDE if kind == EDGE else FLOOR
     if kind == APEX:
         force[:] = 0.0
-    elif kind == FLOOR or kind == RIM:
+    elif kind in (FLOOR, RIM):
         force[n] = f_min
-    if kind == EDGE or kind == RIM:
+    if kind in (EDGE, RIM):
         for p in range(n):
             force[p] *= mu * force[n] / size
     changed = kind != piece[i]
