@@ -1,4 +1,4 @@
-"""Clarabel: the problem in full, x = (f, w), with its cones as they are; a route that shares nothing with the kernels."""
+"""Clarabel: the problem in full, x = (f, w), its cones as they are; a route that shares nothing with the kernels."""
 
 from time import perf_counter
 from typing import Any, NamedTuple

@@ -82,7 +82,7 @@ def contact_forces(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-un
         if best <= EXACT:
             return best
     cones = _start(H, h, mu, f_min, dim, work)
-    goal = FIRST_GOAL
+    goal, least = FIRST_GOAL, np.inf
     for _ in range(ITERATIONS):
         gap, left, size = _measure(mu, f_min, dim, work)
         if gap + left <= goal * size:
@@ -98,7 +98,13 @@ def contact_forces(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-un
             x[i] = -g[i]
         solve_factored(M, x, n)
         alpha = min(1.0, _step_length(mu, f_min, dim, False, work))
-        _correct(mu, f_min, dim, (1.0 - alpha) ** 3 * gap / cones, work)
+        # Mehrotra's rule alone can cycle: the second-order term is only as good as the predictor is long (Colombo and
+        # Gondzio 2008), and without progress one step is taken towards the central path instead.
+        sigma, second = (1.0 - alpha) ** 3, alpha * alpha
+        if gap + left > 0.9 * least:
+            sigma, second = max(sigma, 0.5), 0.0
+        least = min(least, gap + left)
+        _correct(mu, f_min, dim, sigma * gap / cones, second, work)
         solve_factored(M, x, n)
         alpha = 0.99 * _step_length(mu, f_min, dim, True, work)
         if not alpha > 1e-12:  # also when nan
@@ -333,16 +339,16 @@ def _reach(v0, v1, v2, d0, d1, d2):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _correct(mu, f_min, dim, target, work):  # type: ignore[no-untyped-def]
-    r"""From the predictor's steps: c = lam \ (target e - (W^-1 ds) o (W dy)), and x = -g + A'W^-1 c."""
+def _correct(mu, f_min, dim, target, second, work):  # type: ignore[no-untyped-def]
+    r"""From the predictor's steps: c = lam \ (target e - second (W^-1 ds) o (W dy)), and x = -g + A'W^-1 c."""
     x, g, u, lam, c, bar, floor = work.x, work.g, work.u, work.lam, work.c, work.bar, work.floor
     for i in range(mu.shape[0]):
         t, e = i * dim, (i + 1) * dim - 1
         l0, l1, l2 = lam[i, 0], lam[i, 1], lam[i, 2]
         u0, u1, u2 = u[i, 0], u[i, 1], u[i, 2]
         v0, v1, v2 = -l0 - u0, -l1 - u1, -l2 - u2
-        d0 = target - u0 * v0 - u1 * v1 - u2 * v2
-        d1, d2 = -u0 * v1 - v0 * u1, -u0 * v2 - v0 * u2
+        d0 = target - second * (u0 * v0 + u1 * v1 + u2 * v2)
+        d1, d2 = -second * (u0 * v1 + v0 * u1), -second * (u0 * v2 + v0 * u2)
         c0 = (l0 * d0 - l1 * d1 - l2 * d2) / lam[i, 3]
         inverse = 1.0 / l0
         c1, c2 = (d1 - c0 * l1) * inverse, (d2 - c0 * l2) * inverse
@@ -352,7 +358,7 @@ def _correct(mu, f_min, dim, target, work):  # type: ignore[no-untyped-def]
         if dim == 3:
             x[t + 1] = c2 - g[t + 1]
         if f_min[i] > 0.0:
-            floor[i, C] = (target - floor[i, DP] * floor[i, DQ]) / floor[i, P]
+            floor[i, C] = (target - second * floor[i, DP] * floor[i, DQ]) / floor[i, P]
             x[e] += floor[i, C]
 
 

@@ -84,7 +84,7 @@ Options = dict[str, Any]
 
 def _edges(problem: WrenchProblem, method: str, options: Options) -> int:
     """Edges of the pyramids that this method solves for in place of the cones; 0 if it solves for the cones."""
-    edges = int(options.get("edges", EDGES if problem.dim == 3 else 0))
+    edges: int = options.get("edges", EDGES if problem.dim == 3 else 0)
     if method.startswith("qp:"):
         if "edges" in options and problem.dim == 2:
             raise fail("edges", edges, "left out in the plane, where the cones are linear")
