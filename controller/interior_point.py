@@ -12,10 +12,11 @@ from numba import njit
 from pivoting.controller.certificate import kkt_residual
 from pivoting.controller.closed_form import balancing_wrench
 from pivoting.controller.dense import factor, solve_factored
-from pivoting.controller.polish import polish
+from pivoting.controller.polish import gradient, polish, release
 from pivoting.controller.spatial_form import APEX, EDGE, FLOOR, INSIDE, RIM
 
 ITERATIONS = 60  # bound; 6 to 12 are usual
+GUESSES = 3  # polishes of one iterate, each on the pieces that the one before asked for
 FIRST_GOAL = 1e-3  # relative gap at which the pieces are guessed for the first time
 SPREAD = 0.1  # least height of the start above the floors, relative to the largest force
 EXACT = 1e-13  # relative KKT residual at which nothing is left to improve
@@ -85,6 +86,8 @@ def contact_forces(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-un
     goal, least = FIRST_GOAL, np.inf
     for _ in range(ITERATIONS):
         gap, left, size = _measure(mu, f_min, dim, work)
+        if not gap + left < np.inf:
+            break
         if gap + left <= goal * size:
             _guess(mu, f_min, work)
             best = _try(J, b, Q_w, Q_f, mu, f_min, dim, True, f, w, best, work)
@@ -107,7 +110,7 @@ def contact_forces(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-un
         _correct(mu, f_min, dim, sigma * gap / cones, second, work)
         solve_factored(M, x, n)
         alpha = 0.99 * _step_length(mu, f_min, dim, True, work)
-        if not alpha > 1e-12:  # also when nan
+        if alpha <= 1e-12:
             break
         _advance(f_min, min(1.0, alpha), work)
     if best > EXACT:
@@ -119,16 +122,22 @@ def contact_forces(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-un
 def _try(J, b, Q_w, Q_f, mu, f_min, dim, polished, f, w, best, work):  # type: ignore[no-untyped-def]
     """Polish the iterate, or take it as it is; keep it in f and w if its certificate is the better one."""
     trial_f, trial_w = work.trial_f, work.trial_w
-    trial_f[:] = work.now
-    balancing_wrench(J, b, trial_f, trial_w)
-    if polished:
-        polish(J, Q_w, Q_f, work.H, mu, f_min, dim, work.piece, trial_f, trial_w, work)
-    residual = kkt_residual(J, b, Q_w, Q_f, mu, f_min, trial_w, trial_f)
-    if not residual < best:
-        return best
-    f[:] = trial_f
-    w[:] = trial_w
-    return residual
+    for _ in range(GUESSES if polished else 1):
+        trial_f[:] = work.now
+        balancing_wrench(J, b, trial_f, trial_w)
+        if polished:
+            polish(J, Q_w, Q_f, work.H, mu, f_min, dim, work.piece, trial_f, trial_w, work)
+        residual = kkt_residual(J, b, Q_w, Q_f, mu, f_min, trial_w, trial_f)
+        if residual < best:
+            best = residual
+            f[:] = trial_f
+            w[:] = trial_w
+        if best <= EXACT or not polished:
+            return best
+        gradient(J, Q_w, Q_f, trial_w, trial_f, work.pull, work.z)
+        if not release(mu, dim, work.piece, trial_f, work.z):
+            return best
+    return best
 
 
 @njit(cache=True, error_model="numpy")

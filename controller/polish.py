@@ -175,3 +175,25 @@ def _land(mu, f_min, dim, piece, i, force):  # type: ignore[no-untyped-def]
     changed = kind != piece[i]
     piece[i] = kind
     return changed
+
+
+@njit(cache=True, error_model="numpy")
+def release(mu, dim, piece, f, z):  # type: ignore[no-untyped-def]
+    """Leave the pieces whose multipliers (z is the gradient, (n,)) have the wrong sign; True where there was one."""
+    changed = False
+    for i in range(mu.shape[0]):
+        at, n, kind = i * dim, i * dim + dim - 1, piece[i]
+        size = pull = sideways = 0.0
+        for p in range(at, n):
+            size += f[p] * f[p]
+            pull -= z[p] * f[p]
+            sideways += z[p] * z[p]
+        pull = pull / np.sqrt(size) if size > 0.0 else 0.0  # of the friction bound
+        if (kind == EDGE and pull < 0.0) or (kind == FLOOR and z[n] < 0.0):
+            piece[i] = INSIDE
+        elif kind == RIM and pull < 0.0:
+            piece[i] = FLOOR
+        elif (kind == RIM and z[n] < mu[i] * pull) or (kind == APEX and z[n] < mu[i] * np.sqrt(sideways)):
+            piece[i] = EDGE
+        changed |= piece[i] != kind
+    return changed

@@ -91,6 +91,13 @@ def stated(data: Data) -> WrenchProblem:
     return WrenchProblem(data.jacobian, data.required, data.mu, f_min=data.f_min, Q_w=data.Q_w, Q_f=data.Q_f)
 
 
+def trivial_cost(problem: WrenchProblem) -> float:
+    """Of the answer that always exists, f = (0, f_min): the scale of the objective's terms, that may cancel to little."""
+    f = np.zeros((problem.contacts, problem.dim))
+    f[:, -1] = problem.f_min
+    return problem.objective(problem.required - problem.jacobian @ f.ravel(), f)
+
+
 def stack(problems: list[Data]) -> Data:
     """Many problems of one shape, leading axis first."""
     return Data(*(np.ascontiguousarray(np.array(arrays)) for arrays in zip(*problems, strict=True)))
