@@ -102,12 +102,13 @@ def contact_forces(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-un
         solve_factored(M, x, n)
         alpha = min(1.0, _step_length(mu, f_min, dim, False, work))
         # Mehrotra's rule alone can cycle: the second-order term is only as good as the predictor is long (Colombo and
-        # Gondzio 2008), and without progress one step is taken towards the central path instead.
+        # Gondzio 2008), and without progress one step is taken towards the central path instead. The gap must not run
+        # ahead of the dual residual either, or the iterates end at a boundary far from the optimum.
         sigma, second = (1.0 - alpha) ** 3, alpha * alpha
         if gap + left > 0.9 * least:
             sigma, second = max(sigma, 0.5), 0.0
         least = min(least, gap + left)
-        _correct(mu, f_min, dim, sigma * gap / cones, second, work)
+        _correct(mu, f_min, dim, sigma * max(gap, left) / cones, second, work)
         solve_factored(M, x, n)
         alpha = 0.99 * _step_length(mu, f_min, dim, True, work)
         if alpha <= 1e-12:
