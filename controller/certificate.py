@@ -10,17 +10,9 @@ inscribed pyramid they are the same with |f_t| replaced by the gauge of its poly
 import numpy as np
 from numba import njit
 
-ROUND = np.empty((0, 2))  # no polygon: the cone itself
-
 
 @njit(cache=True)
-def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f):  # type: ignore[no-untyped-def]
-    """The largest relative residual of an answer to the problem with its own, round cones; see `polygon_residual`."""
-    return polygon_residual(J, b, Q_w, Q_f, mu, f_min, w, f, ROUND, ROUND)
-
-
-@njit(cache=True)
-def polygon_residual(J, b, Q_w, Q_f, mu, f_min, w, f, vertices, facets):  # type: ignore[no-untyped-def]
+def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, vertices=None, facets=None):  # type: ignore[no-untyped-def]
     """The largest of four relative residuals: equilibrium, friction cones, dual cones, duality gap.
 
     Each is a backward error: relative to the sum of the absolute values of the terms that it is made of (Oettli and
@@ -31,7 +23,7 @@ def polygon_residual(J, b, Q_w, Q_f, mu, f_min, w, f, vertices, facets):  # type
 
     Args:
         J: (nw, K d); b, w: (nw,); f: (K d,); Q_w: (nw, nw); Q_f: (K d, K d); mu (planned), f_min: (K,).
-        vertices, facets: (m, 2) of the polygon that stands for the unit disc, see `polygon`; (0, 2) for the disc.
+        vertices, facets: (m, 2) of the polygon that stands for the unit disc, see `polygon`; None for the disc.
     """
     nw, n = J.shape
     K = mu.shape[0]
@@ -68,11 +60,12 @@ def polygon_residual(J, b, Q_w, Q_f, mu, f_min, w, f, vertices, facets):  # type
             gap += z * f[j]
             size_gap += abs_z * abs(f[j])
             if j < (c + 1) * dim - 1:
-                if facets.shape[0] and j > c * dim:
-                    f_t, z_t = _most(facets, f_0, f[j]), _most(vertices, -z_0, -z)
-                else:
-                    f_0, z_0 = f[j], z
+                if facets is None:  # a branch that the compiler decides
                     f_t, z_t = np.hypot(f_t, f[j]), np.hypot(z_t, z)
+                elif j == c * dim:
+                    f_0, z_0 = f[j], z
+                else:
+                    f_t, z_t = _most(facets, f_0, f[j]), _most(vertices, -z_0, -z)
             else:
                 f_n, z_n = f[j], z
         gap -= f_min[c] * (z_n - mu[c] * z_t)

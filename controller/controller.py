@@ -179,10 +179,12 @@ def step_worlds(belief, tolerance, q, omega, q_d, omega_d, alpha_d, wrench, forc
     """
     nw, n = belief.wrench_map.shape[0], belief.points.shape[0] * belief.force_map.shape[1]
     R, J, b = np.empty((3, 3)), np.empty((nw, n)), np.empty(nw)
-    work = workspace(nw, belief.points.shape[0], belief.force_map.shape[1])
+    scratch = workspace(nw, belief.points.shape[0], belief.force_map.shape[1])
     for i in range(q.shape[0]):
         _fill_problem(belief, q[i], omega[i], q_d, omega_d, alpha_d, R, J, b)
-        residual[i] = smallest_wrench(J, b, belief.Q_w, belief.Q_f, belief.mu, belief.f_min, force[i], wrench[i], work)
+        residual[i] = smallest_wrench(
+            J, b, belief.Q_w, belief.Q_f, belief.mu, belief.f_min, force[i], wrench[i], scratch
+        )
         if not np.isfinite(residual[i]):
             status[i] = FAILED
             wrench[i, :] = np.nan

@@ -4,13 +4,13 @@ import numpy as np
 from numba import njit
 from pivoting.controller.certificate import kkt_residual
 from pivoting.controller.closed_form import balancing_wrench, planar_force, reduce
-from pivoting.controller.interior_point import EXACT, contact_forces
+from pivoting.controller.interior_point import EXACT, contact_forces, views
 from pivoting.controller.polish import polish
 from pivoting.controller.spatial_form import spatial_force
 
 
-@njit(cache=True, error_model="numpy")
-def smallest_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-untyped-def]
+@njit(cache=True, error_model="numpy", inline="always")  # a call would cost a planar solve a third more
+def smallest_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no-untyped-def]
     """Write the optimal contact forces f (K d,) and wrench w (nw,), and return their relative KKT residual.
 
     One contact is solved in closed form (`planar_force`; `spatial_force` and a polish), several by the interior point
@@ -18,12 +18,13 @@ def smallest_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-u
 
     Args:
         J: (nw, K d); b: (nw,) [N, N m]; Q_w: (nw, nw); Q_f: (K d, K d); mu (planned), f_min [N]: (K,).
-        work: scratch, `workspace(nw, K, d)`.
+        scratch: `workspace(nw, K, d)`, for any number of problems of this shape.
     """
     K = mu.shape[0]
     dim = f.shape[0] // K
-    H, h = work.H, work.h
-    reduce(J, b, Q_w, Q_f, H, h, work.x)
+    n = f.shape[0]
+    H, h = scratch[: n * n].reshape(n, n), scratch[2 * n * n : 2 * n * n + n]  # as `views` has them
+    reduce(J, b, Q_w, Q_f, H, h, scratch[n * n : n * n + n])
     if K == 1 and dim == 2:
         planar_force(H, h, mu[0], f_min[0], f)
         balancing_wrench(J, b, f, w)
@@ -32,6 +33,7 @@ def smallest_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-u
         f[:] = np.nan
         w[:] = np.nan
         return np.nan
+    work = views(scratch, J.shape[0], K, dim)
     if K == 1:
         work.piece[0] = spatial_force(H, h, mu[0], f_min[0], f)
         balancing_wrench(J, b, f, w)

@@ -25,7 +25,7 @@ P, Q, DP, DQ, C = 0, 1, 2, 3, 4  # columns of `Work.floor`
 
 
 class Work(NamedTuple):
-    """Scratch of the kernels for one problem size, made once a batch by `workspace`; n = K d."""
+    """Scratch of the kernels for one problem size, see `views`; n = K d."""
 
     H: np.ndarray  # (n, n) and (n,): the problem in f alone
     h: np.ndarray
@@ -52,13 +52,27 @@ class Work(NamedTuple):
 
 @njit(cache=True)
 def workspace(nw, K, dim):  # type: ignore[no-untyped-def]
-    """The scratch of `smallest_wrench` for K contacts of `dim` forces and wrenches of nw components."""
+    """The scratch of `smallest_wrench`, 1-D: K contacts of `dim` forces, wrenches of nw components; see `views`."""
     n = K * dim
+    return np.zeros(2 * n * n + n * dim + 7 * n + 2 * nw + 27 * K + 1)
+
+
+@njit(cache=True)
+def views(scratch, nw, K, dim):  # type: ignore[no-untyped-def]
+    """The parts of a `workspace`. It is handed around whole: passing 21 arrays would cost more than a planar solve."""
+    n = K * dim
+    squares, end = scratch[: 2 * n * n].reshape(2, n, n), 2 * n * n
+    rows, end = scratch[end : end + 7 * n].reshape(7, n), end + 7 * n
+    tangent, end = scratch[end : end + n * dim].reshape(n, dim), end + n * dim
+    wrenches, end = scratch[end : end + 2 * nw].reshape(2, nw), end + 2 * nw
+    triples, end = scratch[end : end + 12 * K].reshape(4, K, 3), end + 12 * K
+    fours, end = scratch[end : end + 8 * K].reshape(2, K, 4), end + 8 * K
+    floor, end = scratch[end : end + 5 * K].reshape(K, 5), end + 5 * K
+    counts = scratch[end : end + 2 * K + 1].view(np.int64)
     return Work(
-        np.empty((n, n)), np.empty(n), np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n), np.empty(n),
-        np.empty(n), np.empty(n), np.empty(nw), np.empty(nw), np.zeros((n, dim)), np.empty(K + 1, np.int64),
-        np.empty(K, np.int64), np.zeros((K, 3)), np.zeros((K, 3)), np.empty((K, 4)), np.empty((K, 4)), np.empty((K, 3)),
-        np.empty((K, 3)), np.zeros((K, 5)),
+        squares[0], rows[0], squares[1], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], wrenches[0], wrenches[1],
+        tangent, counts[: K + 1], counts[K + 1 :], triples[0], triples[1], fours[0], fours[1], triples[2], triples[3],
+        floor,
     )  # fmt: skip
 
 

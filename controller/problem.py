@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.certificate import ROUND, polygon_residual
+from pivoting.controller.certificate import kkt_residual
 from pivoting.controller.polygon import Polygon, polygon
 from pivoting.controller.validate import Array, array, fail, number, positive_definite
 
@@ -107,16 +107,14 @@ class WrenchProblem:
         return float(0.5 * (wrench @ self.Q_w @ wrench + f @ self.Q_f @ f))
 
     def residual(self, wrench: Array, force: Array, *, edges: int = 0) -> float:
-        """Relative KKT residual of an answer, see `certificate.polygon_residual`; nan if it is not finite.
+        """Relative KKT residual of an answer, see `certificate.kkt_residual`; nan if it is not finite.
 
         With `edges` > 0 that of the program whose cones in space are replaced by inscribed pyramids.
         """
         w, f = np.array(wrench, dtype=float), np.array(force, dtype=float).ravel()
-        shape = self._pyramid(edges) if edges else Polygon(ROUND, ROUND)
+        shape = self._pyramid(edges) if edges else (None, None)
         return float(
-            polygon_residual(
-                self.jacobian, self.required, self.Q_w, self.Q_f, self.mu_planned, self.f_min, w, f, *shape
-            )
+            kkt_residual(self.jacobian, self.required, self.Q_w, self.Q_f, self.mu_planned, self.f_min, w, f, *shape)
         )
 
     def _pyramid(self, edges: int) -> Polygon:

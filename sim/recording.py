@@ -24,9 +24,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.controller.solution import Solution
 from pivoting.controller.solution_space import SolutionSpace, solution_space
-from pivoting.controller.solvers import solve
+from pivoting.controller.solvers import Solution, solve
 from pivoting.controller.space import Motion
 from pivoting.controller.validate import fail
 from pivoting.models.reading import matrix

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from pivoting.controller import WrenchProblem
 from pivoting.controller.dispatch import smallest_wrench
-from pivoting.controller.interior_point import workspace
+from pivoting.controller.interior_point import views, workspace
 
 SETS = ("scattered", "line", "point", "face", "plane", "edge")
 PIECES = ("inside", "edge", "floor", "rim", "apex")
@@ -124,7 +124,7 @@ def solve_all(many: Data) -> Answers:
 @njit
 def _loop(J, b, Q_w, Q_f, mu, f_min, f, w, residual, piece):  # type: ignore[no-untyped-def]
     K = mu.shape[1]
-    work = workspace(w.shape[1], K, f.shape[1] // K)
+    scratch = workspace(w.shape[1], K, f.shape[1] // K)
     for i in range(J.shape[0]):
-        residual[i] = smallest_wrench(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], f[i], w[i], work)
-        piece[i] = work.piece
+        residual[i] = smallest_wrench(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], f[i], w[i], scratch)
+        piece[i] = views(scratch, w.shape[1], K, f.shape[1] // K).piece
