@@ -7,16 +7,19 @@ from pivoting.controller.stale import drop_stale_kernels
 drop_stale_kernels(Path(__file__).parent)  # before any kernel is loaded
 
 # ruff: noqa: E402
+from pivoting.controller.conic import ClarabelWorkspace
 from pivoting.controller.contacts import Contact
 from pivoting.controller.controller import WrenchController
 from pivoting.controller.laws import Body, Law
 from pivoting.controller.problem import WrenchProblem, wrench_weight
 from pivoting.controller.references import Constant, MinimumJerk, Reference, Sampled, Sine
-from pivoting.controller.solvers import Solution, SolveError, methods, solve
+from pivoting.controller.solution import Solution, SolveError
+from pivoting.controller.solvers import methods, pyramid_excess, solve
 from pivoting.controller.space import Motion
 
 __all__ = [
     "Body",
+    "ClarabelWorkspace",
     "Constant",
     "Contact",
     "Law",
@@ -30,6 +33,7 @@ __all__ = [
     "WrenchController",
     "WrenchProblem",
     "methods",
+    "pyramid_excess",
     "solve",
     "wrench_weight",
 ]

@@ -3,15 +3,16 @@
 For  min 1/2 w'Q_w w + 1/2 f'Q_f f  s.t.  J f + w = b,  f_i in K_i = {|f_t| <= mu f_n, f_n >= f_min}
 the multiplier of the equality is y = -Q_w w, and z = Q_f f - J'Q_w w is the gradient along f. The answer is optimal
 iff it is feasible and z'f is the least value of z' over the cones: z_n >= mu |z_t| (z in the dual cone) and
-z'f = sum f_min (z_n - mu |z_t|). All four conditions are closed form, in the plane and in space, for any K.
+z'f = sum f_min (z_n - mu |z_t|). All four conditions are closed form, in the plane and in space, for any K. For an
+inscribed pyramid they are the same with |f_t| replaced by the gauge of its polygon and |z_t| by the support of -z_t.
 """
 
 import numpy as np
 from numba import njit
 
 
-@njit(cache=True)
-def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f):  # type: ignore[no-untyped-def]
+@njit(cache=True, error_model="numpy")
+def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, vertices=None, facets=None):  # type: ignore[no-untyped-def]
     """The largest of four relative residuals: equilibrium, friction cones, dual cones, duality gap.
 
     Each is a backward error: relative to the sum of the absolute values of the terms that it is made of (Oettli and
@@ -22,6 +23,7 @@ def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f):  # type: ignore[no-untyped-de
 
     Args:
         J: (nw, K d); b, w: (nw,); f: (K d,); Q_w: (nw, nw); Q_f: (K d, K d); mu (planned), f_min: (K,).
+        vertices, facets: (m, 2) of the polygon that stands for the unit disc, see `polygon`; None for the disc.
     """
     nw, n = J.shape
     K = mu.shape[0]
@@ -45,6 +47,7 @@ def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f):  # type: ignore[no-untyped-de
         size_gap += abs(w[i]) * abs_pull[i]
     for c in range(K):
         f_t = z_t = f_n = z_n = 0.0
+        f_0 = z_0 = 0.0
         for j in range(c * dim, (c + 1) * dim):
             z = abs_z = 0.0
             for i in range(n):
@@ -57,8 +60,12 @@ def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f):  # type: ignore[no-untyped-de
             gap += z * f[j]
             size_gap += abs_z * abs(f[j])
             if j < (c + 1) * dim - 1:
-                f_t = np.hypot(f_t, f[j])
-                z_t = np.hypot(z_t, z)
+                if facets is None:  # a branch that the compiler decides
+                    f_t, z_t = np.hypot(f_t, f[j]), np.hypot(z_t, z)
+                elif j == c * dim:
+                    f_0, z_0 = f[j], z
+                else:
+                    f_t, z_t = _most(facets, f_0, f[j]), _most(vertices, -z_0, -z)
             else:
                 f_n, z_n = f[j], z
         gap -= f_min[c] * (z_n - mu[c] * z_t)
@@ -73,7 +80,16 @@ def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f):  # type: ignore[no-untyped-de
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _most(rows, x, y):  # type: ignore[no-untyped-def]
+    """max over rows (m, 2) of row . (x, y)."""
+    most = -np.inf
+    for k in range(rows.shape[0]):
+        most = max(most, rows[k, 0] * x + rows[k, 1] * y)
+    return most
+
+
+@njit(cache=True, error_model="numpy")
 def _ratio(worst, size):  # type: ignore[no-untyped-def]
     """worst / size, where nothing out of nothing is no error."""
     if worst == 0.0 and size == 0.0:

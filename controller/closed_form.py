@@ -11,34 +11,39 @@ from numba import njit
 SMALL = 1e-15  # relative optimality at which a candidate is taken without looking at the others
 
 
-@njit(cache=True)
-def reduce(J, b, Q_w, Q_f, H, h):  # type: ignore[no-untyped-def]
-    """Write H = Q_f + J'Q_w J (n, n) and h = J'Q_w b (n,) of the problem in f alone."""
+@njit(cache=True, error_model="numpy")
+def reduce(J, b, Q_w, Q_f, H, h, row):  # type: ignore[no-untyped-def]
+    """Write H = Q_f + J'Q_w J (n, n) and h = J'Q_w b (n,) of the problem in f alone; row (n,) is scratch."""
     nw, n = J.shape
     for j in range(n):
         h[j] = 0.0
         for i in range(j + 1):
             H[i, j] = 0.5 * (Q_f[i, j] + Q_f[j, i])
-    for j in range(n):
-        for p in range(nw):
-            weighted = 0.0  # (Q_w J)[p, j]
-            for q in range(nw):
-                weighted += Q_w[p, q] * J[q, j]
-            h[j] += weighted * b[p]
-            for i in range(j + 1):
-                H[i, j] += J[p, i] * weighted
+    for p in range(nw):
+        for j in range(n):
+            row[j] = 0.0
+        for q in range(nw):  # row p of Q_w J, along rows of J: contiguous, so that it vectorises
+            weight = Q_w[p, q]
+            for j in range(n):
+                row[j] += weight * J[q, j]
+        for j in range(n):
+            h[j] += row[j] * b[p]
+        for i in range(n):
+            left = J[p, i]
+            for j in range(i, n):
+                H[i, j] += left * row[j]
     for j in range(n):
         for i in range(j):
             H[j, i] = H[i, j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _gradient(H, h, t, n):  # type: ignore[no-untyped-def]
     """H f - h at f = (t, n)."""
     return H[0, 0] * t + H[0, 1] * n - h[0], H[1, 0] * t + H[1, 1] * n - h[1]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _violation(H, h, mu, f_min, t, n):  # type: ignore[no-untyped-def]
     """How far a feasible (t, n) is from optimal: the gradient's distance from the dual cone, and the gap."""
     z_t, z_n = _gradient(H, h, t, n)
@@ -51,7 +56,7 @@ def _violation(H, h, mu, f_min, t, n):  # type: ignore[no-untyped-def]
     return max(-slack / scale, abs(gap) / (scale * size) if size > 0.0 else 0.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def planar_force(H, h, mu, f_min, f):  # type: ignore[no-untyped-def]
     """Write the minimiser (f_t, f_n) of 1/2 f'H f - h'f over {|f_t| <= mu f_n, f_n >= f_min} into f (2,).
 
@@ -90,7 +95,7 @@ def planar_force(H, h, mu, f_min, f):  # type: ignore[no-untyped-def]
         f[0] = f[1] = np.nan
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def balancing_wrench(J, b, f, w):  # type: ignore[no-untyped-def]
     """Write w = b - J f: with the contact forces given, only one wrench balances."""
     for i in range(J.shape[0]):

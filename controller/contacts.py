@@ -47,7 +47,7 @@ class Contact:
         return int(self.point.size)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def fill_jacobian(R, points, frames, wrench_map, force_map, J):  # type: ignore[no-untyped-def]
     """Write the contact Jacobian into J (nw, K d): contact forces, in contact axes, to the wrench in object axes.
 

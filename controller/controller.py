@@ -11,15 +11,15 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
-from pivoting.controller.certificate import kkt_residual
-from pivoting.controller.closed_form import balancing_wrench, planar_force, reduce
 from pivoting.controller.contacts import Contact, fill_jacobian
+from pivoting.controller.dispatch import smallest_wrench
+from pivoting.controller.interior_point import workspace
 from pivoting.controller.laws import Body, Law, fill_required
 from pivoting.controller.problem import WrenchProblem, wrench_weight
 from pivoting.controller.space import IDENTITY, Motion, Space, fill_rotation, rotation_matrix, space
 from pivoting.controller.validate import Array, array, fail, number, positive_definite
 
-SOLVED, INACCURATE, FAILED = 0, 1, 2  # codes of `solvers.STATUS`
+SOLVED, INACCURATE, FAILED = 0, 1, 2  # codes of `solution.STATUS`
 
 
 class Belief(NamedTuple):
@@ -156,7 +156,7 @@ def _lifted_frame(contact: Contact, here: Space, table: Array) -> Array:
     return np.column_stack([t, np.cross(n, t), n])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _fill_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ignore[no-untyped-def]
     """Write R (3, 3), J (nw, K d) and the required wrench b (nw,) at one state."""
     fill_rotation(q, R)
@@ -167,7 +167,7 @@ def _fill_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ig
     )  # fmt: skip
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def step_worlds(belief, tolerance, q, omega, q_d, omega_d, alpha_d, wrench, force, residual, status):  # type: ignore[no-untyped-def]
     """State, solve and certify the problem of every world; answers are written into the last four arrays.
 
@@ -181,13 +181,13 @@ def step_worlds(belief, tolerance, q, omega, q_d, omega_d, alpha_d, wrench, forc
         residual: (W,) out.  status: (W,) out, int8: 0 solved, 1 inaccurate, 2 failed.
     """
     nw, n = belief.wrench_map.shape[0], belief.points.shape[0] * belief.force_map.shape[1]
-    R, J, b, H, h = np.empty((3, 3)), np.empty((nw, n)), np.empty(nw), np.empty((n, n)), np.empty(n)
+    R, J, b = np.empty((3, 3)), np.empty((nw, n)), np.empty(nw)
+    scratch = workspace(nw, belief.points.shape[0], belief.force_map.shape[1])
     for i in range(q.shape[0]):
         _fill_problem(belief, q[i], omega[i], q_d, omega_d, alpha_d, R, J, b)
-        reduce(J, b, belief.Q_w, belief.Q_f, H, h)
-        planar_force(H, h, belief.mu[0], belief.f_min[0], force[i])
-        balancing_wrench(J, b, force[i], wrench[i])
-        residual[i] = kkt_residual(J, b, belief.Q_w, belief.Q_f, belief.mu, belief.f_min, wrench[i], force[i])
+        residual[i] = smallest_wrench(
+            J, b, belief.Q_w, belief.Q_f, belief.mu, belief.f_min, force[i], wrench[i], scratch
+        )
         if not np.isfinite(residual[i]):
             status[i] = FAILED
             wrench[i, :] = np.nan
@@ -195,7 +195,7 @@ def step_worlds(belief, tolerance, q, omega, q_d, omega_d, alpha_d, wrench, forc
             status[i] = SOLVED if residual[i] <= tolerance else INACCURATE
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def world_wrench(wrench_map, q, wrench, out):  # type: ignore[no-untyped-def]
     """Turn wrenches in object axes into (force, torque) at the CoM in WORLD axes, as `xfrc_applied` wants them.
 

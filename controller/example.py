@@ -7,7 +7,8 @@ from pivoting.controller.contacts import Contact
 from pivoting.controller.controller import WrenchController
 from pivoting.controller.laws import Body, Law
 from pivoting.controller.problem import WrenchProblem
-from pivoting.controller.solvers import Solution, SolveError, methods, solve
+from pivoting.controller.solution import Solution, SolveError
+from pivoting.controller.solvers import methods, solve
 from pivoting.controller.space import Motion
 
 THETA = np.deg2rad(30.0)

@@ -79,7 +79,7 @@ class Law:
         return self.feedforward, self.kp, self.kd, self.velocity_terms
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def fill_required(R, q, omega, q_d, omega_d, alpha_d, law, mass, inertia, gravity, pivot, wrench_map, out):  # type: ignore[no-untyped-def]
     """Write the required wrench (nw,) in object axes: what contact and applied wrench must make together.
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 from pivoting.controller.certificate import kkt_residual
+from pivoting.controller.polygon import Polygon, polygon
 from pivoting.controller.validate import Array, array, fail, number, positive_definite
 
 
@@ -105,28 +106,50 @@ class WrenchProblem:
         f = np.ravel(force)
         return float(0.5 * (wrench @ self.Q_w @ wrench + f @ self.Q_f @ f))
 
-    def residual(self, wrench: Array, force: Array) -> float:
-        """Relative KKT residual of an answer, see `certificate.kkt_residual`; nan if it is not finite."""
-        w, f = np.array(wrench, dtype=float), np.array(force, dtype=float).ravel()
-        return float(kkt_residual(self.jacobian, self.required, self.Q_w, self.Q_f, self.mu_planned, self.f_min, w, f))
+    def residual(self, wrench: Array, force: Array, *, edges: int = 0) -> float:
+        """Relative KKT residual of an answer, see `certificate.kkt_residual`; nan if it is not finite.
 
-    def standard_form(self) -> StandardForm:
-        """The planar problem as the notes' QP in x = (f, w), with rows of C: floor, right edge, left edge.
+        With `edges` > 0 that of the program whose cones in space are replaced by inscribed pyramids.
+        """
+        w, f = np.array(wrench, dtype=float), np.array(force, dtype=float).ravel()
+        shape = self._pyramid(edges) if edges else (None, None)
+        return float(
+            kkt_residual(self.jacobian, self.required, self.Q_w, self.Q_f, self.mu_planned, self.f_min, w, f, *shape)
+        )
+
+    def _pyramid(self, edges: int) -> Polygon:
+        if self.dim != 3:
+            raise fail("edges", edges, "left out in the plane, where the cones are linear")
+        return polygon(edges)
+
+    def standard_form(self, *, edges: int = 0) -> StandardForm:
+        """The problem as the notes' QP in x = (f, w), with rows of C for each contact: floor, edges of the cone.
+
+        In the plane the edges are right and left. In space the cone is replaced by the inscribed pyramid of `edges`
+        faces, whose answers are feasible for the cone and, in general, not optimal.
 
         Raises:
-            ValueError: in space, where the cones are not linear.
+            ValueError: in space without `edges`, where the cones are not linear; in the plane with them.
         """
-        if self.dim != 2:
-            raise ValueError(f"problem.dim = {self.dim}: the standard QP form is planar, cones in space are not linear")
+        if self.dim != 2 and not edges:
+            raise ValueError(
+                f"problem.dim = {self.dim}: the standard QP form is planar, cones in space are not linear; "
+                "give edges for inscribed pyramids"
+            )
+        faces = self._pyramid(edges).facets if edges else np.array([[1.0], [-1.0]])
         nw, n = self.jacobian.shape
         K = self.contacts
         P = np.zeros((n + nw, n + nw))
         P[:n, :n], P[n:, n:] = self.Q_f, self.Q_w
-        C = np.zeros((3 * K, n + nw))
-        d = np.zeros(3 * K)
+        rows, dim = 1 + len(faces), self.dim
+        C = np.zeros((rows * K, n + nw))
+        d = np.zeros(rows * K)
         for i, (mu, floor) in enumerate(zip(self.mu_planned, self.f_min, strict=True)):
-            C[3 * i : 3 * i + 3, 2 * i : 2 * i + 2] = [[0.0, -1.0], [1.0, -mu], [-1.0, -mu]]
-            d[3 * i] = -floor
+            normal = dim * (i + 1) - 1
+            C[rows * i, normal] = -1.0
+            d[rows * i] = -floor
+            C[rows * i + 1 : rows * (i + 1), dim * i : normal] = faces
+            C[rows * i + 1 : rows * (i + 1), normal] = -mu
         return StandardForm(P, np.hstack([self.jacobian, np.eye(nw)]), self.required, C, d)
 
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 from pivoting.controller.problem import WrenchProblem
-from pivoting.controller.solvers import Solution
+from pivoting.controller.solution import Solution
 from pivoting.controller.validate import Array, fail
 
 

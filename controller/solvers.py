@@ -1,64 +1,26 @@
-"""Solving a wrench problem: closed form, Clarabel, or any QP backend of qpsolvers; every answer is certified."""
+"""Solving a wrench problem: compiled kernels, Clarabel, or any QP backend of qpsolvers; every answer is certified."""
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import partial
 from time import perf_counter
 from typing import Any
 
 import numpy as np
-from pivoting.controller.closed_form import balancing_wrench, planar_force, reduce
-from pivoting.controller.problem import StandardForm, WrenchProblem
-from pivoting.controller.validate import Array, fail, number
+from pivoting.controller.conic import CLARABEL, Answer, clarabel_answer, scaled, split
+from pivoting.controller.dispatch import smallest_wrench
+from pivoting.controller.interior_point import workspace
+from pivoting.controller.problem import WrenchProblem
+from pivoting.controller.solution import INSCRIBED, STATUS, TOLERANCE, Solution, SolveError, certified
+from pivoting.controller.validate import fail, number
 
-TOLERANCE = 1e-7  # relative KKT residual; the closed form stays below 1e-11, interior points reach about 1e-9
-STATUS = ("solved", "inaccurate", "failed")  # indexed by the status codes of the compiled loop
+__all__ = ["INSCRIBED", "STATUS", "TOLERANCE", "Solution", "SolveError", "methods", "pyramid_excess", "solve"]
 
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """An answer with its certificate.
-
-    Attributes:
-        problem: what was solved.
-        wrench: (nw,) applied wrench w about the CoM, in the problem's frame (the object's) [N, N m].
-        force: (K, d) contact forces, (f_t, f_n) or (f_t, f_o, f_n), in each contact's frame [N].
-        residual: relative KKT residual, computed here whatever the solver said.
-        status: "solved", "inaccurate" (residual above tolerance) or "failed" (no finite answer).
-        method: the method that gave it.
-        seconds: wall time of the solver alone.
-    """
-
-    problem: WrenchProblem = field(repr=False)
-    wrench: Array
-    force: Array
-    residual: float
-    status: str
-    method: str
-    seconds: float
-
-    @property
-    def objective(self) -> float:
-        """1/2 w'Q_w w + 1/2 f'Q_f f, the program as the notes state it (their printed Obj is twice that)."""
-        return self.problem.objective(self.wrench, self.force)
-
-
-class SolveError(RuntimeError):
-    """No answer within tolerance. Carries the `problem` and the refused `solution` (with status and residual)."""
-
-    def __init__(self, solution: Solution, tolerance: float, said: str):
-        self.problem = solution.problem
-        self.solution = solution
-        super().__init__(
-            f"{solution.method}: {solution.status}, KKT residual {solution.residual:.3g} above tolerance "
-            f"{tolerance:g}; the solver said: {said}"
-        )
-
+EDGES = 8  # of the pyramids that a QP solver is given in space
 
 # Backends whose own default tolerance is looser than ours; the problem that they see is scaled to order one.
 _TIGHT: dict[str, dict[str, Any]] = {
-    "clarabel": {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11, "max_step_fraction": 0.95},
+    "clarabel": CLARABEL,
     "cvxopt": {"feastol": 1e-10, "abstol": 1e-11, "reltol": 1e-10},
     "ecos": {"feastol": 1e-10, "abstol": 1e-10, "reltol": 1e-10},
     "osqp": {"eps_abs": 1e-9, "eps_rel": 1e-9, "polishing": True},
@@ -75,28 +37,41 @@ def solve(
 
     Args:
         problem: the wrench problem.
-        method: "closed-form" (one planar contact), "clarabel", or "qp:<backend>" with any backend of qpsolvers that is
-            installed (planar problems; see `methods`).
+        method: "closed-form" (compiled: closed form for one contact, an interior point with a polish for several),
+            "clarabel", or "qp:<backend>" with any backend of qpsolvers that is installed (see `methods`). A QP has no
+            round cones: in space it is given inscribed pyramids. Its answer is feasible but costs more than the
+            optimum (`pyramid_excess`), so its status is "inscribed", never "solved", and its residual is that of
+            the program with pyramids; `problem.residual` tells how far it is from the optimum of the cones.
         tolerance: largest relative KKT residual of an answer that is returned.
-        options: passed on to the solver, on top of the tight tolerances that are the default here.
+        options: `edges` of the pyramids (>= 3, default 8; QP in space only); all others are passed on to the solver,
+            on top of the tight tolerances that are the default here.
 
     Raises:
         SolveError: no answer within tolerance; it carries the problem and what the solver gave.
         ValueError: unknown method, or one that cannot serve this problem.
     """
     number("tolerance", tolerance, above=0.0)
-    route = _route(problem, method)
+    edges = _edges(problem, method, options)
+    route = _route(method)
     start = perf_counter()
-    wrench, force, said = route(problem, options)
+    wrench, force, said = route(problem, {key: value for key, value in options.items() if key != "edges"}, edges)
     seconds = perf_counter() - start
-    residual = problem.residual(wrench, force)
-    status = STATUS[2] if not np.isfinite(residual) else STATUS[0] if residual <= tolerance else STATUS[1]
-    for values in (wrench, force):
-        values.flags.writeable = False
-    solution = Solution(problem, wrench, force.reshape(-1, problem.dim), residual, status, method, seconds)
-    if status != "solved":
-        raise SolveError(solution, tolerance, said)
-    return solution
+    return certified(
+        problem, wrench, force, said, method=method, seconds=seconds, tolerance=tolerance, edges=edges
+    )  # fmt: skip
+
+
+def pyramid_excess(problem: WrenchProblem, edges: int = EDGES, *, backend: str = "daqp") -> float:
+    """How much more, relatively, the optimum of inscribed pyramids costs than that of the cones: the price of a QP.
+
+    About (1 - cos(pi / edges)) of the friction is given up between two vertices; 0 where there is nothing to pay.
+
+    Raises:
+        SolveError, ValueError: as `solve`.
+    """
+    cone = solve(problem).objective
+    pyramid = solve(problem, f"qp:{backend}", edges=edges).objective
+    return (pyramid - cone) / cone if cone > 0.0 else 0.0
 
 
 def methods() -> tuple[str, ...]:
@@ -104,19 +79,26 @@ def methods() -> tuple[str, ...]:
     return ("closed-form", "clarabel", *(f"qp:{name}" for name in sorted(_backends())))
 
 
-Answer = tuple[Array, Array, str]  # wrench (nw,), force (K d,), the solver's own word
 Options = dict[str, Any]
 
 
-def _route(problem: WrenchProblem, method: str) -> Callable[[WrenchProblem, Options], Answer]:
+def _edges(problem: WrenchProblem, method: str, options: Options) -> int:
+    """Edges of the pyramids that this method solves for in place of the cones; 0 if it solves for the cones."""
+    edges: int = options.get("edges", EDGES if problem.dim == 3 else 0)
+    if method.startswith("qp:"):
+        if "edges" in options and problem.dim == 2:
+            raise fail("edges", edges, "left out in the plane, where the cones are linear")
+        return edges
+    if "edges" in options:
+        raise fail("options", options, f'without "edges": {method} needs no pyramids')
+    return 0
+
+
+def _route(method: str) -> Callable[[WrenchProblem, Options, int], Answer]:
     if method == "closed-form":
-        if problem.dim != 2 or problem.contacts != 1:
-            raise fail("method", method, f'another for this problem ({problem.contacts} contacts): try "clarabel"')
-        return _closed_form
-    if problem.dim != 2:
-        raise fail("method", method, "used on a planar problem")
+        return _compiled
     if method == "clarabel":
-        return _clarabel
+        return lambda problem, options, edges: clarabel_answer(problem, options)
     if method.startswith("qp:"):
         installed = _backends()
         if method[3:] not in installed:
@@ -132,56 +114,30 @@ def _backends() -> list[str]:
     return list(qpsolvers.available_solvers)
 
 
-def _closed_form(problem: WrenchProblem, options: Options) -> Answer:
+def _compiled(problem: WrenchProblem, options: Options, edges: int) -> Answer:
     if options:
         raise fail("options", options, "empty for the closed form")
-    n = problem.jacobian.shape[1]
-    H, h, f, w = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(problem.jacobian.shape[0])
-    reduce(problem.jacobian, problem.required, problem.Q_w, problem.Q_f, H, h)
-    planar_force(H, h, problem.mu_planned[0], problem.f_min[0], f)
-    balancing_wrench(problem.jacobian, problem.required, f, w)
-    return w, f, "closed form"
+    nw, n = problem.jacobian.shape
+    f, w = np.empty(n), np.empty(nw)
+    smallest_wrench(
+        problem.jacobian,
+        problem.required,
+        problem.Q_w,
+        problem.Q_f,
+        problem.mu_planned,
+        problem.f_min,
+        f,
+        w,
+        workspace(nw, problem.contacts, problem.dim),
+    )
+    return w, f, "compiled kernel"
 
 
-def _scaled(problem: WrenchProblem) -> tuple[StandardForm, float]:
-    """The standard form with forces in units of the load and weights of order one, and the unit [N].
-
-    The cones are homogeneous, so scaling changes nothing but what a solver's absolute tolerances mean. Answers are
-    proportional to the unit, so that without a load (unit 0) the answer is exactly nothing.
-    """
-    form = problem.standard_form()
-    unit = max(float(np.abs(form.b).max()), float(np.abs(form.d).max()))
-    scale = unit or 1.0
-    return form._replace(P=form.P / np.abs(form.P).max(), b=form.b / scale, d=form.d / scale), unit
-
-
-def _clarabel(problem: WrenchProblem, options: Options) -> Answer:
-    import clarabel
-    from scipy import sparse
-
-    form, unit = _scaled(problem)
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    for key, value in {**_TIGHT["clarabel"], **options}.items():
-        if not hasattr(settings, key):
-            raise fail("options", key, "a setting of Clarabel")
-        setattr(settings, key, value)
-    answer = clarabel.DefaultSolver(
-        sparse.csc_matrix(np.triu(form.P)),
-        np.zeros(form.P.shape[0]),
-        sparse.csc_matrix(np.vstack([form.A, form.C])),
-        np.concatenate([form.b, form.d]),
-        [clarabel.ZeroConeT(form.b.size), clarabel.NonnegativeConeT(form.d.size)],
-        settings,
-    ).solve()
-    return _split(problem, np.array(answer.x), unit, str(answer.status))
-
-
-def _qp(backend: str, problem: WrenchProblem, options: Options) -> Answer:
+def _qp(backend: str, problem: WrenchProblem, options: Options, edges: int) -> Answer:
     import qpsolvers
     from scipy import sparse
 
-    form, unit = _scaled(problem)
+    form, unit = scaled(problem.standard_form(edges=edges))
     matrices = [form.P, form.C, form.A]
     if backend not in qpsolvers.dense_solvers:
         matrices = [sparse.csc_matrix(matrix) for matrix in matrices]
@@ -190,12 +146,5 @@ def _qp(backend: str, problem: WrenchProblem, options: Options) -> Answer:
     try:
         answer = qpsolvers.solve_problem(stated, solver=backend, **{**_TIGHT.get(backend, {}), **options})
     except qpsolvers.exceptions.SolverError as error:
-        return _split(problem, None, unit, f"{type(error).__name__}: {error}")
-    return _split(problem, answer.x, unit, "found" if answer.found else "not found")
-
-
-def _split(problem: WrenchProblem, x: Array | None, unit: float, said: str) -> Answer:
-    """x = (f, w) / unit of the standard form into (w, f); a missing answer becomes nan, which no one can use."""
-    nw, n = problem.jacobian.shape
-    full = np.full(n + nw, np.nan) if x is None or np.size(x) != n + nw else unit * np.asarray(x, dtype=float)
-    return full[n:].copy(), full[:n].copy(), said
+        return split(problem, None, f"{type(error).__name__}: {error}", unit)
+    return split(problem, answer.x, "found" if answer.found else "not found", unit)

@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from pivoting.controller.contacts import Contact
 from pivoting.controller.controller import WrenchController, world_wrench
 from pivoting.controller.laws import Body, Law
-from pivoting.controller.solvers import Solution, solve
+from pivoting.controller.solution import Solution
+from pivoting.controller.solvers import solve
 from pivoting.controller.space import Motion, quaternion_product
 from pivoting.controller.validate import fail
 from pivoting.models.reading import ModelError, PlanarBody, read_body, read_friction

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 from pivoting.controller.example import EXAMPLES, Digit
-from pivoting.controller.solvers import Solution
+from pivoting.controller.solution import Solution
 from pivoting.sim.run import Run
 from pivoting.sim.scenario import SCENARIOS
 from rich.console import Console

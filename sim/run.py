@@ -43,7 +43,7 @@ class Run:
         wrench_world: (W, N, 6) applied force and torque at the CoM, world axes.
         force: (W, N, 1, 2) contact force (f_t, f_n) predicted by the solution, table axes [N].
         force_measured: (W, N, 1, 2) by MuJoCo's contact sensor, likewise.
-        residual: (W, N) relative KKT residuals.  status: (W, N) codes of `solvers.STATUS`, 0 is solved.
+        residual: (W, N) relative KKT residuals.  status: (W, N) codes of `solution.STATUS`, 0 is solved.
         control_us: (N,) time to state, solve and certify the problem of one world [microseconds].
         wall_s: of the loop.
         controller: "scenario" for the scenario's own, "given" for another that was handed to `simulate`.

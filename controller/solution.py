@@ -1,0 +1,83 @@
+"""An answer with its certificate, and the error that carries a refused one."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from pivoting.controller.problem import WrenchProblem
+from pivoting.controller.validate import Array
+
+TOLERANCE = 1e-7  # relative KKT residual; the closed form stays below 1e-11, interior points reach about 1e-9
+INSCRIBED = "inscribed"  # optimal for an inscribed pyramid, which is not the problem that was asked
+STATUS = ("solved", "inaccurate", "failed")  # indexed by the status codes of the compiled loop
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """An answer with its certificate.
+
+    Attributes:
+        problem: what was solved.
+        wrench: (nw,) applied wrench w about the CoM, in the problem's frame (the object's) [N, N m].
+        force: (K, d) contact forces, (f_t, f_n) or (f_t, f_o, f_n), in each contact's frame [N].
+        residual: relative KKT residual, computed here whatever the solver said; with edges > 0 that of the pyramids.
+        status: "solved"; "inscribed" (solved, but for inscribed pyramids: feasible, and not the optimum of `problem`);
+            "inaccurate" (residual above tolerance) or "failed" (no finite answer).
+        method: the method that gave it.
+        seconds: wall time of the solver alone.
+        edges: of the pyramids that stood for the cones in space; 0: the cones themselves.
+    """
+
+    problem: WrenchProblem = field(repr=False)
+    wrench: Array
+    force: Array
+    residual: float
+    status: str
+    method: str
+    seconds: float
+    edges: int = 0
+
+    @property
+    def objective(self) -> float:
+        """1/2 w'Q_w w + 1/2 f'Q_f f, the program as the notes state it (their printed Obj is twice that)."""
+        return self.problem.objective(self.wrench, self.force)
+
+
+class SolveError(RuntimeError):
+    """No answer within tolerance. Carries the `problem` and the refused `solution` (with status and residual)."""
+
+    def __init__(self, solution: Solution, tolerance: float, said: str):
+        self.problem = solution.problem
+        self.solution = solution
+        super().__init__(
+            f"{solution.method}: {solution.status}, KKT residual {solution.residual:.3g} above tolerance "
+            f"{tolerance:g}; the solver said: {said}"
+        )
+
+
+def certified(
+    problem: WrenchProblem,
+    wrench: Array,
+    force: Array,
+    said: str,
+    *,
+    method: str,
+    seconds: float,
+    tolerance: float = TOLERANCE,
+    edges: int = 0,
+) -> Solution:
+    """The answer of a solver, wrench (nw,) and force (K d,), as a Solution that carries its certificate.
+
+    Raises:
+        SolveError: the residual is above `tolerance`, or the answer is not finite.
+    """
+    residual = problem.residual(wrench, force, edges=edges)
+    if residual <= tolerance:
+        status = INSCRIBED if edges else STATUS[0]
+    else:
+        status = STATUS[1] if np.isfinite(residual) else STATUS[2]
+    for values in (wrench, force):
+        values.flags.writeable = False
+    solution = Solution(problem, wrench, force.reshape(-1, problem.dim), residual, status, method, seconds, edges)
+    if not residual <= tolerance:
+        raise SolveError(solution, tolerance, said)
+    return solution

@@ -1,0 +1,130 @@
+"""Random problems with any number of contacts, degenerate sets among them, as arrays for compiled batches."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from pivoting.controller import WrenchProblem
+from pivoting.controller.dispatch import smallest_wrench
+from pivoting.controller.interior_point import views, workspace
+
+SETS = ("scattered", "line", "point", "face", "plane", "edge")
+PIECES = ("inside", "edge", "floor", "rim", "apex")
+
+
+class Data(NamedTuple):
+    """One problem's arrays, or (with a leading axis) those of many."""
+
+    jacobian: np.ndarray
+    required: np.ndarray
+    Q_w: np.ndarray
+    Q_f: np.ndarray
+    mu: np.ndarray
+    f_min: np.ndarray
+
+
+def weight(rng: np.random.Generator, size: int, decades: float) -> np.ndarray:
+    """A full symmetric positive definite matrix with a condition number of up to 10^decades."""
+    axes, _ = np.linalg.qr(rng.normal(size=(size, size)))
+    spread = rng.uniform(0.0, decades)
+    values = 10.0 ** np.concatenate([[0.0, spread], rng.uniform(0.0, spread, size - 2)])
+    matrix = (axes * values) @ axes.T * 10.0 ** rng.uniform(-1.0, 1.0)
+    return 0.5 * (matrix + matrix.T)
+
+
+def rotation(rng: np.random.Generator) -> np.ndarray:
+    """(3, 3), uniform."""
+    axes, upper = np.linalg.qr(rng.normal(size=(3, 3)))
+    axes = axes * np.sign(np.diag(upper))
+    return axes * np.linalg.det(axes)
+
+
+def wedge(r: np.ndarray) -> np.ndarray:
+    """r x f = wedge(r) f in space, (1, 2) in the plane (erratum 3 of the notes)."""
+    if r.size == 2:
+        return np.array([[-r[1], r[0]]])
+    return np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
+
+
+def contact_points(rng: np.random.Generator, K: int, dim: int, kind: str) -> np.ndarray:
+    """(K, dim): scattered, on a line, all at one point, corners of a face, in a plane, or two points repeated."""
+    size = 10.0 ** rng.uniform(-2.0, 0.5)
+    centre, sides = rng.normal(size=dim) * size, rng.normal(size=(2, dim)) * size
+    corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])[np.arange(K) % 4]
+    spans = {
+        "scattered": rng.normal(size=(K, dim)) * size,
+        "line": np.linspace(-1.0, 1.0, K)[:, None] * sides[0] if K > 1 else np.zeros((1, dim)),
+        "point": np.zeros((K, dim)),
+        "face": corners @ sides,
+        "plane": rng.normal(size=(K, 2)) @ sides,
+        "edge": corners[:, :1] * sides[0],
+    }
+    return centre + spans[kind]
+
+
+def draw(rng: np.random.Generator, K: int, dim: int = 3, *, kind: str | None = None, decades: float = 6.0) -> Data:
+    """Any pose and lever, one contact plane or several, full weights, mu 0.05 to 1.5, with and without floors."""
+    points = contact_points(rng, K, dim, kind or SETS[rng.integers(len(SETS))])
+    shared = rng.random() < 0.7
+    columns: list[np.ndarray] = []
+    up = np.zeros(dim)
+    for i in range(K):
+        if i == 0 or not shared:
+            if dim == 3:
+                R = rotation(rng)
+            else:
+                angle = rng.uniform(-np.pi, np.pi)
+                R = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+            up = up if i else R[:, -1]
+        columns.append(np.vstack([R, wedge(points[i]) @ R]))
+    nw = 3 * dim - 3
+    required = rng.normal(size=nw) * 10.0 ** rng.uniform(-2.0, 3.0)
+    if rng.random() < 0.5:  # otherwise half of all loads would only lift off
+        required[:dim] += up * np.linalg.norm(required) * rng.uniform(0.0, 3.0)
+    floors = 10.0 ** rng.uniform(-1.0, 2.0, K) * (rng.random(K) < 0.5) * (rng.random() < 0.7)
+    mu = np.exp(rng.uniform(np.log(0.05), np.log(1.5), K))
+    return Data(np.hstack(columns), required, weight(rng, nw, decades), weight(rng, K * dim, decades), mu, floors)
+
+
+def stated(data: Data) -> WrenchProblem:
+    """The same as a WrenchProblem."""
+    return WrenchProblem(data.jacobian, data.required, data.mu, f_min=data.f_min, Q_w=data.Q_w, Q_f=data.Q_f)
+
+
+def trivial_cost(problem: WrenchProblem) -> float:
+    """Of the answer that always exists, f = (0, f_min): the scale of terms that may cancel to little."""
+    f = np.zeros((problem.contacts, problem.dim))
+    f[:, -1] = problem.f_min
+    return problem.objective(problem.required - problem.jacobian @ f.ravel(), f)
+
+
+def stack(problems: list[Data]) -> Data:
+    """Many problems of one shape, leading axis first."""
+    return Data(*(np.ascontiguousarray(np.array(arrays)) for arrays in zip(*problems, strict=True)))
+
+
+class Answers(NamedTuple):
+    """force (N, K d), wrench (N, nw), residual (N,), piece (N, K) as an index of PIECES."""
+
+    force: np.ndarray
+    wrench: np.ndarray
+    residual: np.ndarray
+    piece: np.ndarray
+
+
+def solve_all(many: Data) -> Answers:
+    """All problems through the compiled entry, in one compiled loop."""
+    N, nw, n = many.jacobian.shape
+    K = many.mu.shape[1]
+    out = Answers(np.empty((N, n)), np.empty((N, nw)), np.empty(N), np.empty((N, K), dtype=np.int64))
+    _loop(*many, *out)
+    return out
+
+
+@njit
+def _loop(J, b, Q_w, Q_f, mu, f_min, f, w, residual, piece):  # type: ignore[no-untyped-def]
+    K = mu.shape[1]
+    scratch = workspace(w.shape[1], K, f.shape[1] // K)
+    for i in range(J.shape[0]):
+        residual[i] = smallest_wrench(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], f[i], w[i], scratch)
+        piece[i] = views(scratch, w.shape[1], K, f.shape[1] // K).piece
