@@ -5,8 +5,12 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from pivoting.controller import WrenchProblem
+from pivoting.controller.certificate import kkt_residual
+from pivoting.controller.closed_form import balancing_wrench, reduce
 from pivoting.controller.dispatch import smallest_wrench
 from pivoting.controller.interior_point import views, workspace
+from pivoting.controller.polish import polish
+from pivoting.controller.spatial_form import spatial_force
 
 SETS = ("scattered", "line", "point", "face", "plane", "edge")
 PIECES = ("inside", "edge", "floor", "rim", "apex")
@@ -128,3 +132,22 @@ def _loop(J, b, Q_w, Q_f, mu, f_min, f, w, residual, piece):  # type: ignore[no-
     for i in range(J.shape[0]):
         residual[i] = smallest_wrench(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], f[i], w[i], scratch)
         piece[i] = views(scratch, w.shape[1], K, f.shape[1] // K).piece
+
+
+def closed_form_residuals(many: Data) -> np.ndarray:
+    """(N,) residuals of one contact in space by closed form and polish alone."""
+    out = np.empty(len(many.required))
+    _closed_form(*many, out)
+    return out
+
+
+@njit
+def _closed_form(J, b, Q_w, Q_f, mu, f_min, residual):  # type: ignore[no-untyped-def]
+    work = views(workspace(6, 1, 3), 6, 1, 3)
+    f, w = np.empty(3), np.empty(6)
+    for i in range(J.shape[0]):
+        reduce(J[i], b[i], Q_w[i], Q_f[i], work.H, work.h, work.x)
+        work.piece[0] = spatial_force(work.H, work.h, mu[i, 0], f_min[i, 0], f)
+        balancing_wrench(J[i], b[i], f, w)
+        polish(J[i], Q_w[i], Q_f[i], work.H, mu[i], f_min[i], 3, work.piece, f, w, work)
+        residual[i] = kkt_residual(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], w, f)
