@@ -72,5 +72,11 @@ def fill_jacobian(R, points, frames, wrench_map, force_map, J):  # type: ignore[
                     a2 += R[p, 2] * u
             m0, m1, m2 = cross(points[i, 0], points[i, 1], points[i, 2], a0, a1, a2)
             for row in range(wrench_map.shape[0]):
-                P = wrench_map[row]
-                J[row, dim * i + j] = P[0] * a0 + P[1] * a1 + P[2] * a2 + P[3] * m0 + P[4] * m1 + P[5] * m2
+                J[row, dim * i + j] = (
+                    wrench_map[row, 0] * a0
+                    + wrench_map[row, 1] * a1
+                    + wrench_map[row, 2] * a2
+                    + wrench_map[row, 3] * m0
+                    + wrench_map[row, 4] * m1
+                    + wrench_map[row, 5] * m2
+                )

@@ -116,5 +116,11 @@ def fill_required(R, q, omega, q_d, omega_d, alpha_d, law, mass, inertia, gravit
     M1 = inertia[1, 0] * a0 + inertia[1, 1] * a1 + inertia[1, 2] * a2 + c * k1
     M2 = inertia[2, 0] * a0 + inertia[2, 1] * a1 + inertia[2, 2] * a2 + c * k2
     for row in range(wrench_map.shape[0]):
-        P = wrench_map[row]
-        out[row] = P[0] * F0 + P[1] * F1 + P[2] * F2 + P[3] * M0 + P[4] * M1 + P[5] * M2
+        out[row] = (
+            wrench_map[row, 0] * F0
+            + wrench_map[row, 1] * F1
+            + wrench_map[row, 2] * F2
+            + wrench_map[row, 3] * M0
+            + wrench_map[row, 4] * M1
+            + wrench_map[row, 5] * M2
+        )
