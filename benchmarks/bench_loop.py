@@ -13,7 +13,8 @@ import mujoco
 import numpy as np
 from harness import main
 from mujoco.batch import Batch
-from pivoting.models import load
+from pivoting.models import instrument, load
+from pivoting.models.scenes import TABLE
 from pivoting.sim import scenario, simulate
 from pivoting.sim.recording import record
 from pivoting.sim.run import Run
@@ -39,9 +40,10 @@ def bare(run: Run, steps: int) -> float:
     return spent / (steps // RESTART * RESTART)
 
 
-def open_loop(run: Run, steps: int) -> float:
-    """Seconds a step of `Batch.step` alone, all worlds of the run."""
-    model = load(run.scenario.path, run.scenario.actual).compile()
+def open_loop(run: Run, steps: int, *, sensors: bool = True) -> float:
+    """Seconds a step of `Batch.step` alone, all worlds: the model that the loop steps, or it without sensors."""
+    spec = load(run.scenario.path, run.scenario.actual)
+    model = instrument(spec, run.truth, TABLE)[0] if sensors else spec.compile()
     batch = Batch(model, run.worlds)
     spent = 0.0
     for _ in range(max(1, steps // RESTART)):
@@ -68,7 +70,9 @@ def measure(quick: bool) -> dict[str, float]:
     fleet = []
     for _ in range(max(3, rounds // 5)):
         many = simulate(SCENARIO, worlds=256, seconds=0.2, hold=0.05)
-        fleet.append((many.wall_s / (many.time.size - 1), open_loop(many, many.time.size - 1)))
+        steps_many = many.time.size - 1
+        alone = open_loop(many, steps_many), open_loop(many, steps_many, sensors=False)
+        fleet.append((many.wall_s / steps_many, *alone))
     pair = np.array(fleet)
     return {
         "one world: closed / bare mj_step": float(np.median(one[:, 0] / one[:, 1])),
@@ -76,6 +80,7 @@ def measure(quick: bool) -> dict[str, float]:
         "one world: bare mj_step, us": 1e6 * float(np.median(one[:, 1])),
         "one world: state, solve, certify, us": float(np.median(one[:, 2])),
         "256 worlds: closed / open Batch.step": float(np.median(pair[:, 0] / pair[:, 1])),
+        "256 worlds: closed / open without sensors": float(np.median(pair[:, 0] / pair[:, 2])),
         "256 worlds: closed, us a step and world": 1e6 / 256 * float(np.median(pair[:, 0])),
         "256 worlds: open, us a step and world": 1e6 / 256 * float(np.median(pair[:, 1])),
         "recording written when the loop is over, s": recorded(rounds),
