@@ -8,10 +8,10 @@ inscribed pyramid they are the same with |f_t| replaced by the gauge of its poly
 """
 
 import numpy as np
-from numba import njit
+from pivoting.controller.kernel import kernel
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, vertices=None, facets=None):  # type: ignore[no-untyped-def]
     """The largest of four relative residuals: equilibrium, friction cones, dual cones, duality gap.
 
@@ -37,14 +37,14 @@ def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, vertices=None, facets=None):  
         worst_w, size_w = max(worst_w, abs(sum_w)), max(size_w, abs_w)
         if i < dim:
             size_f = max(size_f, abs_w)
-    pull, abs_pull = np.zeros(nw), np.zeros(nw)  # Q_w w
+    pull = np.zeros((2, nw))  # Q_w w, and with absolute values
     for i in range(nw):
         for j in range(nw):
-            pull[i] += Q_w[i, j] * w[j]
-            abs_pull[i] += abs(Q_w[i, j] * w[j])
+            pull[0, i] += Q_w[i, j] * w[j]
+            pull[1, i] += abs(Q_w[i, j] * w[j])
     worst_f = worst_z = size_z = gap = size_gap = 0.0
     for i in range(nw):
-        size_gap += abs(w[i]) * abs_pull[i]
+        size_gap += abs(w[i]) * pull[1, i]
     for c in range(K):
         f_t = z_t = f_n = z_n = 0.0
         f_0 = z_0 = 0.0
@@ -54,8 +54,8 @@ def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, vertices=None, facets=None):  
                 z += Q_f[j, i] * f[i]
                 abs_z += abs(Q_f[j, i] * f[i])
             for i in range(nw):
-                z -= J[i, j] * pull[i]
-                abs_z += abs(J[i, j]) * abs_pull[i]
+                z -= J[i, j] * pull[0, i]
+                abs_z += abs(J[i, j]) * pull[1, i]
             size_z = max(size_z, abs_z)
             gap += z * f[j]
             size_gap += abs_z * abs(f[j])
@@ -80,7 +80,7 @@ def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, vertices=None, facets=None):  
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _most(rows, x, y):  # type: ignore[no-untyped-def]
     """max over rows (m, 2) of row . (x, y)."""
     most = -np.inf
@@ -89,7 +89,7 @@ def _most(rows, x, y):  # type: ignore[no-untyped-def]
     return most
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _ratio(worst, size):  # type: ignore[no-untyped-def]
     """worst / size, where nothing out of nothing is no error."""
     if worst == 0.0 and size == 0.0:

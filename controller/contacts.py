@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
+from pivoting.controller.kernel import inlined
 from pivoting.controller.space import cross
 from pivoting.controller.validate import Array, array, fail, number
 
@@ -47,7 +47,7 @@ class Contact:
         return int(self.point.size)
 
 
-@njit(cache=True, error_model="numpy")
+@inlined
 def fill_jacobian(R, points, frames, wrench_map, force_map, J):  # type: ignore[no-untyped-def]
     """Write the contact Jacobian into J (nw, K d): contact forces, in contact axes, to the wrench in object axes.
 
@@ -65,6 +65,8 @@ def fill_jacobian(R, points, frames, wrench_map, force_map, J):  # type: ignore[
             a0 = a1 = a2 = 0.0
             for axis in range(3):  # axis j of the contact frame, in object axes: R^T frame
                 pick = force_map[axis, j]
+                if pick == 0.0:
+                    continue
                 for p in range(3):
                     u = pick * frames[i, p, axis]
                     a0 += R[p, 0] * u

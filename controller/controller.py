@@ -9,11 +9,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 from pivoting.controller.contacts import Contact, fill_jacobian
-from pivoting.controller.dispatch import smallest_wrench
-from pivoting.controller.interior_point import workspace
+from pivoting.controller.dispatch import smallest_wrench, workspace
+from pivoting.controller.kernel import inlined, kernel
 from pivoting.controller.laws import Body, Law, fill_required
 from pivoting.controller.problem import WrenchProblem, wrench_weight
 from pivoting.controller.space import IDENTITY, Motion, Space, fill_rotation, rotation_matrix, space
@@ -124,6 +123,10 @@ class WrenchController:
             force_map=np.ascontiguousarray(here.force_map),
         )
 
+    def workspace(self) -> tuple[Array, Array | None]:
+        """Scratch of the compiled loop, one for each thread."""
+        return workspace(len(self.Q_w), len(self.contacts), self.space.dim)
+
     def problem(self, state: Motion, desired: Motion | None = None) -> WrenchProblem:
         """The wrench problem, in object axes, at `state` (acceleration not used), reference at `desired`.
 
@@ -156,7 +159,7 @@ def _lifted_frame(contact: Contact, here: Space, table: Array) -> Array:
     return np.column_stack([t, np.cross(n, t), n])
 
 
-@njit(cache=True, error_model="numpy")
+@inlined
 def _fill_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ignore[no-untyped-def]
     """Write R (3, 3), J (nw, K d) and the required wrench b (nw,) at one state."""
     fill_rotation(q, R)
@@ -167,12 +170,13 @@ def _fill_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ig
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
-def step_worlds(belief, tolerance, q, omega, q_d, omega_d, alpha_d, wrench, force, residual, status):  # type: ignore[no-untyped-def]
+@kernel
+def step_worlds(belief, work, tolerance, q, omega, q_d, omega_d, alpha_d, wrench, force, residual, status):  # type: ignore[no-untyped-def]
     """State, solve and certify the problem of every world; answers are written into the last four arrays.
 
     Args:
         belief: `Belief`, shared by the worlds.
+        work: `WrenchController.workspace()`.
         tolerance: largest relative KKT residual of status 0 (solved).
         q: (W, 4) and omega: (W, 3), the measured orientations and angular velocities, world axes.
         q_d, omega_d, alpha_d: (4,), (3,), (3,), the reference now.
@@ -182,12 +186,10 @@ def step_worlds(belief, tolerance, q, omega, q_d, omega_d, alpha_d, wrench, forc
     """
     nw, n = belief.wrench_map.shape[0], belief.points.shape[0] * belief.force_map.shape[1]
     R, J, b = np.empty((3, 3)), np.empty((nw, n)), np.empty(nw)
-    scratch = workspace(nw, belief.points.shape[0], belief.force_map.shape[1])
+    Q_w, Q_f, mu, f_min = belief.Q_w, belief.Q_f, belief.mu, belief.f_min  # taken out once: it shows in the plane
     for i in range(q.shape[0]):
         _fill_problem(belief, q[i], omega[i], q_d, omega_d, alpha_d, R, J, b)
-        residual[i] = smallest_wrench(
-            J, b, belief.Q_w, belief.Q_f, belief.mu, belief.f_min, force[i], wrench[i], scratch
-        )
+        residual[i] = smallest_wrench(J, b, Q_w, Q_f, mu, f_min, force[i], wrench[i], work[0], work[1])
         if not np.isfinite(residual[i]):
             status[i] = FAILED
             wrench[i, :] = np.nan
@@ -195,7 +197,7 @@ def step_worlds(belief, tolerance, q, omega, q_d, omega_d, alpha_d, wrench, forc
             status[i] = SOLVED if residual[i] <= tolerance else INACCURATE
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def world_wrench(wrench_map, q, wrench, out):  # type: ignore[no-untyped-def]
     """Turn wrenches in object axes into (force, torque) at the CoM in WORLD axes, as `xfrc_applied` wants them.
 

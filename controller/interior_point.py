@@ -8,10 +8,10 @@ program solvers", 2010), with s a function of f: every iterate is strictly feasi
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from pivoting.controller.certificate import kkt_residual
 from pivoting.controller.closed_form import balancing_wrench
 from pivoting.controller.dense import factor, solve_factored
+from pivoting.controller.kernel import kernel
 from pivoting.controller.polish import gradient, polish, release
 from pivoting.controller.spatial_form import APEX, EDGE, FLOOR, INSIDE, RIM
 
@@ -50,16 +50,15 @@ class Work(NamedTuple):
     floor: np.ndarray  # (K, 5): slack p = f_n - f_min, its multiplier q, dp, dq, corrector
 
 
-@njit(cache=True, error_model="numpy")
-def workspace(nw, K, dim):  # type: ignore[no-untyped-def]
-    """The scratch of `smallest_wrench`, 1-D: K contacts of `dim` forces, wrenches of nw components; see `views`."""
+def scratch_size(nw: int, K: int, dim: int) -> int:
+    """Length of the scratch of `views`: K contacts of `dim` forces, wrenches of nw components."""
     n = K * dim
-    return np.zeros(2 * n * n + n * dim + 7 * n + 2 * nw + 27 * K + 1)
+    return 2 * n * n + n * dim + 7 * n + 2 * nw + 27 * K + 1
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def views(scratch, nw, K, dim):  # type: ignore[no-untyped-def]
-    """The parts of a `workspace`. It is handed around whole: passing 21 arrays would cost more than a planar solve."""
+    """The parts of a scratch, which is handed around whole: passing 21 arrays would cost more than a planar solve."""
     n = K * dim
     squares, end = scratch[: 2 * n * n].reshape(2, n, n), 2 * n * n
     rows, end = scratch[end : end + 7 * n].reshape(7, n), end + 7 * n
@@ -76,7 +75,7 @@ def views(scratch, nw, K, dim):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def contact_forces(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-untyped-def]
     """Write the optimum into f (n,) and w (nw,), given finite H and h in `work`; return its relative KKT residual."""
     n = f.shape[0]
@@ -133,7 +132,7 @@ def contact_forces(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-un
     return best
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _try(J, b, Q_w, Q_f, mu, f_min, dim, polished, f, w, best, work):  # type: ignore[no-untyped-def]
     """Polish the iterate, or take it as it is; keep it in f and w if its certificate is the better one."""
     trial_f, trial_w = work.trial_f, work.trial_w
@@ -155,7 +154,7 @@ def _try(J, b, Q_w, Q_f, mu, f_min, dim, polished, f, w, best, work):  # type: i
     return best
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _nothing_pulls(h, mu, f_min, dim):  # type: ignore[no-untyped-def]
     """Is -h in every dual cone, and no floor above 0: then f = 0 is the optimum."""
     for i in range(mu.shape[0]):
@@ -166,7 +165,7 @@ def _nothing_pulls(h, mu, f_min, dim):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _inside(mu, f_min, dim, f):  # type: ignore[no-untyped-def]
     """Is every force (n,) in its truncated cone?"""
     for i in range(mu.shape[0]):
@@ -177,7 +176,7 @@ def _inside(mu, f_min, dim, f):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _start(H, h, mu, f_min, dim, work):  # type: ignore[no-untyped-def]
     """From the free minimum in `now` to a strictly feasible start with multipliers on the central path's scale.
 
@@ -216,7 +215,7 @@ def _start(H, h, mu, f_min, dim, work):  # type: ignore[no-untyped-def]
     return cones
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _measure(mu, f_min, dim, work):  # type: ignore[no-untyped-def]
     """Slacks and gradient of the iterate; its gap, what is left of the dual residual, and the size of both."""
     H, h, now, g, s, y, floor = work.H, work.h, work.now, work.g, work.s, work.y, work.floor
@@ -245,7 +244,7 @@ def _measure(mu, f_min, dim, work):  # type: ignore[no-untyped-def]
     return gap, left, size
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _guess(mu, f_min, work):  # type: ignore[no-untyped-def]
     """The piece each contact is on: of slack and multiplier, the one that is not small."""
     s, y, floor = work.s, work.y, work.floor
@@ -264,14 +263,14 @@ def _guess(mu, f_min, work):  # type: ignore[no-untyped-def]
             work.piece[i] = RIM if low else EDGE
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _determinant(v0, v1, v2):  # type: ignore[no-untyped-def]
     """v_0^2 - |v_1|^2 without the cancellation of the squares."""
     size = np.sqrt(v1 * v1 + v2 * v2)
     return (v0 - size) * (v0 + size)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _unscale(b0, b1, b2, eta, v0, v1, v2):  # type: ignore[no-untyped-def]
     """W^-1 v for the scaling point b."""
     dot = b1 * v1 + b2 * v2
@@ -280,7 +279,7 @@ def _unscale(b0, b1, b2, eta, v0, v1, v2):  # type: ignore[no-untyped-def]
     return (b0 * v0 - dot) * inverse, (v1 + slope * b1) * inverse, (v2 + slope * b2) * inverse
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _scale(mu, f_min, dim, work):  # type: ignore[no-untyped-def]
     """The Nesterov-Todd scaling W y = W^-1 s = lam of every cone, and M += A'W^-2 A block by block.
 
@@ -313,7 +312,7 @@ def _scale(mu, f_min, dim, work):  # type: ignore[no-untyped-def]
             M[e, e] += floor[i, Q] / floor[i, P]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _step_length(mu, f_min, dim, corrected, work):  # type: ignore[no-untyped-def]
     """The steps that belong to the step x of f, and how far (<= 2) they may be followed to the first boundary.
 
@@ -350,7 +349,7 @@ def _step_length(mu, f_min, dim, corrected, work):  # type: ignore[no-untyped-de
     return alpha
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _reach(v0, v1, v2, d0, d1, d2):  # type: ignore[no-untyped-def]
     """The largest t <= 2 with v + t d in the second-order cone, v inside: the first root of a quadratic."""
     inside = _determinant(v0, v1, v2)
@@ -362,7 +361,7 @@ def _reach(v0, v1, v2, d0, d1, d2):  # type: ignore[no-untyped-def]
     return inside / slope if slope > 0.5 * inside else 2.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _correct(mu, f_min, dim, target, second, work):  # type: ignore[no-untyped-def]
     r"""From the predictor's steps: c = lam \ (target e - second (W^-1 ds) o (W dy)), and x = -g + A'W^-1 c."""
     x, g, u, lam, c, bar, floor = work.x, work.g, work.u, work.lam, work.c, work.bar, work.floor
@@ -386,7 +385,7 @@ def _correct(mu, f_min, dim, target, second, work):  # type: ignore[no-untyped-d
             x[e] += floor[i, C]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _advance(f_min, alpha, work):  # type: ignore[no-untyped-def]
     """Follow the step: f, and the multipliers; the slacks are functions of f."""
     for i in range(work.x.shape[0]):

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
+from pivoting.controller.kernel import inlined
 from pivoting.controller.space import cross, into, rotation_error
 from pivoting.controller.validate import number, one_of, positive_definite
 
@@ -79,7 +79,7 @@ class Law:
         return self.feedforward, self.kp, self.kd, self.velocity_terms
 
 
-@njit(cache=True, error_model="numpy")
+@inlined
 def fill_required(R, q, omega, q_d, omega_d, alpha_d, law, mass, inertia, gravity, pivot, wrench_map, out):  # type: ignore[no-untyped-def]
     """Write the required wrench (nw,) in object axes: what contact and applied wrench must make together.
 

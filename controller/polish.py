@@ -6,14 +6,14 @@ there are no arcs. Newton then converges quadratically to a point whose certific
 """
 
 import numpy as np
-from numba import njit
 from pivoting.controller.dense import factor, solve_factored
+from pivoting.controller.kernel import kernel
 from pivoting.controller.spatial_form import APEX, EDGE, FLOOR, INSIDE, RIM
 
 STEPS = 12  # bound of the Newton steps; 2 or 3 suffice once the pieces are right
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def gradient(J, Q_w, Q_f, w, f, pull, z):  # type: ignore[no-untyped-def]
     """Write Q_w w into pull (nw,) and Q_f f - J'Q_w w, the gradient of the objective along f, into z (n,)."""
     nw, n = J.shape
@@ -34,7 +34,7 @@ def gradient(J, Q_w, Q_f, w, f, pull, z):  # type: ignore[no-untyped-def]
             z[j] -= J[i, j] * value
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def polish(J, Q_w, Q_f, H, mu, f_min, dim, piece, f, w, work):  # type: ignore[no-untyped-def]
     """Improve f (n,) and w (nw,) in place, staying on the pieces `piece` (K,) int, which a blocked step may change.
 
@@ -98,7 +98,7 @@ def polish(J, Q_w, Q_f, H, mu, f_min, dim, piece, f, w, work):  # type: ignore[n
             return
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _carry(J, f, before, w):  # type: ignore[no-untyped-def]
     """w -= J (f - before)."""
     for i in range(J.shape[0]):
@@ -108,7 +108,7 @@ def _carry(J, f, before, w):  # type: ignore[no-untyped-def]
         w[i] -= value
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _tangents(mu, dim, piece, at, f, tangent):  # type: ignore[no-untyped-def]
     """Write d f / d coordinates of the contact at rows at, at + 1, ... of tangent (n, dim); return how many."""
     n = at + dim - 1
@@ -132,7 +132,7 @@ def _tangents(mu, dim, piece, at, f, tangent):  # type: ignore[no-untyped-def]
     return arc + 1
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _move(mu, f_min, dim, piece, i, first, x, tangent, f):  # type: ignore[no-untyped-def]
     """Move contact i by its step x[first:]; True where it changed its piece, being stopped by another one."""
     at, n, kind = i * dim, i * dim + dim - 1, piece[i]
@@ -152,7 +152,7 @@ def _move(mu, f_min, dim, piece, i, first, x, tangent, f):  # type: ignore[no-un
     return _land(mu, f_min, dim, piece, i, f[at : at + dim])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _land(mu, f_min, dim, piece, i, force):  # type: ignore[no-untyped-def]
     """Put a force (dim,) exactly on its piece; True where that is not the piece it was on, which it left."""
     kind, n = piece[i], dim - 1
@@ -177,7 +177,7 @@ def _land(mu, f_min, dim, piece, i, force):  # type: ignore[no-untyped-def]
     return changed
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def release(mu, dim, piece, f, z):  # type: ignore[no-untyped-def]
     """Leave the pieces whose multipliers (z is the gradient, (n,)) have the wrong sign; True where there was one."""
     changed = False

@@ -10,8 +10,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
+from pivoting.controller.kernel import inlined, kernel
 from pivoting.controller.validate import Array, array, fail
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
@@ -130,7 +130,7 @@ def quaternion_product(p: Array, q: Array) -> Array:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@inlined
 def fill_rotation(q, out):  # type: ignore[no-untyped-def]
     """Write the rotation matrix (3, 3) of quaternion q (4,) into out; q need not be exactly of unit length."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -146,13 +146,13 @@ def fill_rotation(q, out):  # type: ignore[no-untyped-def]
     out[2, 2] = 1.0 - s * (x * x + y * y)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def cross(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
     """a x b, as three scalars: no arrays in the inner loops."""
     return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def into(R, a0, a1, a2):  # type: ignore[no-untyped-def]
     """R^T a: a world vector in object axes, as three scalars."""
     return (
@@ -162,7 +162,7 @@ def into(R, a0, a1, a2):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def rotation_error(q, q_d):  # type: ignore[no-untyped-def]
     """Rotation vector [rad], in object axes, that turns orientation q into q_d; its length is at most pi."""
     # q^-1 q_d, in the object's axes

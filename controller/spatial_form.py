@@ -7,13 +7,13 @@ these, but in lambda they have a pole and a hard case at h_3 = 0, and in t neith
 """
 
 import numpy as np
-from numba import njit
+from pivoting.controller.kernel import kernel
 
 INSIDE, EDGE, FLOOR, RIM, APEX = 0, 1, 2, 3, 4  # the pieces of a truncated cone
 SWEEPS, ROOTS = 12, 40  # bounds of the two iterations, which need about 4 each
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def spatial_force(H, h, mu, f_min, f):  # type: ignore[no-untyped-def]
     """Write the minimiser (f_t, f_o, f_n) into f (3,) and return its piece.
 
@@ -67,7 +67,7 @@ def spatial_force(H, h, mu, f_min, f):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _edge(c00, c01, c02, c11, c12, c22, g0, g1, g2, y):  # type: ignore[no-untyped-def]
     """Write into y (3,) the point of the cone {y'C y <= 0, upper half} that is nearest to g, a point outside."""
     v00 = v11 = v22 = 1.0
@@ -113,7 +113,7 @@ def _edge(c00, c01, c02, c11, c12, c22, g0, g1, g2, y):  # type: ignore[no-untyp
     y[2] = v20 * q0 + v21 * q1 + v22 * t
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _rotation(a, b, d):  # type: ignore[no-untyped-def]
     """(cos, sin) of the Jacobi rotation that diagonalises [[a, b], [b, d]]."""
     if b == 0.0:
@@ -126,7 +126,7 @@ def _rotation(a, b, d):  # type: ignore[no-untyped-def]
     return c, t * c
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _nearest(a0, k0, a1, k1, p):  # type: ignore[no-untyped-def]
     """t > max(p, 0) with (a0 / x0)^2 + (a1 / x1)^2 = 1, x_i = t + k_i (t - p).
 
@@ -146,7 +146,7 @@ def _nearest(a0, k0, a1, k1, p):  # type: ignore[no-untyped-def]
     return t
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _disc(a, b, d, g0, g1, radius, f):  # type: ignore[no-untyped-def]
     """Write the minimiser of 1/2 p'[[a, b], [b, d]] p - g'p over |p| <= radius into f[:2]; return FLOOR or RIM."""
     det = a * d - b * b

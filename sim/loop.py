@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
-from pivoting.controller.controller import Belief, WrenchController, step_worlds, world_wrench
-from pivoting.controller.space import Space, space
+from pivoting.controller.controller import WrenchController, step_worlds, world_wrench
+from pivoting.controller.space import space
 from pivoting.controller.validate import fail
 from pivoting.models.reading import PlanarBody, matrix, place, read_body, read_friction, turn
 from pivoting.models.scenes import BODY, TABLE, compiled, corner, instrument, load
@@ -84,7 +84,7 @@ def simulate(
     mujoco.mj_forward(model, data)
     rows = read_rows(model, data)
 
-    log = _loop(batch, attached.controller.belief, attached.controller.space, truth, where, desired, progress)
+    log = _loop(batch, attached.controller, truth, where, desired, progress)
     read = {key: log.sensors[..., columns] for key, columns in where.items()}
     table = matrix(truth.table)[:, [0, 2]]
     return Run(
@@ -174,8 +174,7 @@ def _worlds_first(values: NDArray[Any]) -> NDArray[Any]:
 
 def _loop(
     batch: Batch,
-    belief: Belief,
-    space: Space,
+    controller: WrenchController,
     truth: PlanarBody,
     where: dict[str, slice],
     desired: tuple[Array, Array, Array],
@@ -183,6 +182,7 @@ def _loop(
 ) -> _Log:
     """Step all worlds to the end."""
     steps, worlds = desired[0].size - 1, batch.nsim
+    belief, space = controller.belief, controller.space
     sensordata, xfrc = batch.bind("sensordata"), batch.bind("xfrc_applied")[:, truth.index]
     stage = int(mujoco.mjtStage.mjSTAGE_VEL)
     batch.forward(stage=stage)
@@ -200,17 +200,23 @@ def _loop(
         wall_s=0.0,
     )
     sensors, wrench, wrench_world, force, residual, status, spent, _ = log
-    answers = (wrench[0], force[0], residual[0], status[0])
-    step_worlds(belief, TOLERANCE, q, omega, q_d[0], omega_d[0], alpha_d[0], *answers)  # compiled before it is timed
+    work = controller.workspace()
+    answers = (wrench, force, residual, status)
+    desired_now = (q_d, omega_d, alpha_d)
+
+    def control(k: int) -> None:
+        """State, solve and certify step k of every world."""
+        now, into = [values[k] for values in desired_now], [values[k] for values in answers]
+        step_worlds(belief, work, TOLERANCE, q, omega, *now, *into)
+
+    control(0)  # compiled before it is timed
     world_wrench(belief.wrench_map, q, wrench[0], wrench_world[0])
     sensors[0] = sensordata
     report = max(1, steps // 100)
     start = perf_counter()
     for k in range(steps):
         tick = perf_counter_ns()
-        step_worlds(
-            belief, TOLERANCE, q, omega, q_d[k], omega_d[k], alpha_d[k], wrench[k], force[k], residual[k], status[k]
-        )
+        control(k)
         spent[k] = perf_counter_ns() - tick
         world_wrench(belief.wrench_map, q, wrench[k], wrench_world[k])
         xfrc[:] = wrench_world[k]

@@ -7,8 +7,8 @@ from numba import njit
 from pivoting.controller import WrenchProblem
 from pivoting.controller.certificate import kkt_residual
 from pivoting.controller.closed_form import balancing_wrench, reduce
-from pivoting.controller.dispatch import smallest_wrench
-from pivoting.controller.interior_point import views, workspace
+from pivoting.controller.dispatch import smallest_wrench, workspace
+from pivoting.controller.interior_point import views
 from pivoting.controller.polish import polish
 from pivoting.controller.spatial_form import spatial_force
 
@@ -121,29 +121,29 @@ def solve_all(many: Data) -> Answers:
     N, nw, n = many.jacobian.shape
     K = many.mu.shape[1]
     out = Answers(np.empty((N, n)), np.empty((N, nw)), np.empty(N), np.empty((N, K), dtype=np.int64))
-    _loop(*many, *out)
+    _loop(*many, *out, *workspace(nw, K, n // K))
     return out
 
 
 @njit
-def _loop(J, b, Q_w, Q_f, mu, f_min, f, w, residual, piece):  # type: ignore[no-untyped-def]
+def _loop(J, b, Q_w, Q_f, mu, f_min, f, w, residual, piece, reduced, scratch):  # type: ignore[no-untyped-def]
     K = mu.shape[1]
-    scratch = workspace(w.shape[1], K, f.shape[1] // K)
     for i in range(J.shape[0]):
-        residual[i] = smallest_wrench(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], f[i], w[i], scratch)
-        piece[i] = views(scratch, w.shape[1], K, f.shape[1] // K).piece
+        residual[i] = smallest_wrench(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], f[i], w[i], reduced, scratch)
+        if scratch is not None:
+            piece[i] = views(scratch, w.shape[1], K, f.shape[1] // K).piece
 
 
 def closed_form_residuals(many: Data) -> np.ndarray:
     """(N,) residuals of one contact in space by closed form and polish alone."""
     out = np.empty(len(many.required))
-    _closed_form(*many, out)
+    _closed_form(*many, out, workspace(6, 1, 3)[1])
     return out
 
 
 @njit
-def _closed_form(J, b, Q_w, Q_f, mu, f_min, residual):  # type: ignore[no-untyped-def]
-    work = views(workspace(6, 1, 3), 6, 1, 3)
+def _closed_form(J, b, Q_w, Q_f, mu, f_min, residual, scratch):  # type: ignore[no-untyped-def]
+    work = views(scratch, 6, 1, 3)
     f, w = np.empty(3), np.empty(6)
     for i in range(J.shape[0]):
         reduce(J[i], b[i], Q_w[i], Q_f[i], work.H, work.h, work.x)

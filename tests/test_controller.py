@@ -20,7 +20,8 @@ def test_many_worlds_are_as_many_problems() -> None:
     desired = Motion(0.7, 0.2, -1.0)
     wrench, force, residual, status = np.empty((50, 3)), np.empty((50, 2)), np.empty(50), np.empty(50, np.int8)
     q, omega = BLOCK.space.orientation(thetas), BLOCK.space.axial(omegas)
-    step_worlds(BLOCK.belief, 1e-9, q, omega, *BLOCK.space.lift_motion(desired), wrench, force, residual, status)
+    out = (wrench, force, residual, status)
+    step_worlds(BLOCK.belief, BLOCK.workspace(), 1e-9, q, omega, *BLOCK.space.lift_motion(desired), *out)
     assert not status.any()
     for i in range(50):
         solution = solve(BLOCK.problem(Motion(thetas[i], omegas[i]), desired))
@@ -33,7 +34,8 @@ def test_a_state_that_is_not_a_number_has_no_answer_and_applies_nothing() -> Non
     q = np.stack([BLOCK.space.orientation(0.5), np.full(4, np.nan)])
     omega = np.zeros((2, 3))
     wrench, force, residual, status = np.ones((2, 3)), np.ones((2, 2)), np.zeros(2), np.zeros(2, np.int8)
-    step_worlds(BLOCK.belief, 1e-9, q, omega, *BLOCK.space.lift_motion(Motion(0.5)), wrench, force, residual, status)
+    out = (wrench, force, residual, status)
+    step_worlds(BLOCK.belief, BLOCK.workspace(), 1e-9, q, omega, *BLOCK.space.lift_motion(Motion(0.5)), *out)
     assert status.tolist() == [0, 2]
     assert np.isnan(wrench[1]).all()
     applied = np.ones((2, 6))
@@ -45,7 +47,8 @@ def test_a_state_that_is_not_a_number_has_no_answer_and_applies_nothing() -> Non
 def test_a_tolerance_that_is_not_met_is_a_status() -> None:
     q, omega = BLOCK.space.orientation(np.array([0.5])), np.zeros((1, 3))
     wrench, force, residual, status = np.ones((1, 3)), np.ones((1, 2)), np.zeros(1), np.zeros(1, np.int8)
-    step_worlds(BLOCK.belief, -1.0, q, omega, *BLOCK.space.lift_motion(Motion(0.5)), wrench, force, residual, status)
+    out = (wrench, force, residual, status)
+    step_worlds(BLOCK.belief, BLOCK.workspace(), -1.0, q, omega, *BLOCK.space.lift_motion(Motion(0.5)), *out)
     assert status.tolist() == [1]
 
 
