@@ -1,8 +1,10 @@
 """The closed loop against bare physics: the same scene, alternating in one run.
 
 One world: `simulate` (read, state, solve, certify, apply, step, log) against a loop of nothing but `mj_step`.
-256 worlds: against `Batch.step` with a constant wrench. The physics alone restarts every 200 steps, so that the block
-is still on its corner: a block that lies on its face costs MuJoCo something else. Ratios are medians over pairs.
+256 worlds: against an open-loop `Batch.step` of the same motion, the run's own wrenches played back from its own start
+(bit for bit the same states, which is checked), and against one with a constant wrench, whose block hardly moves and
+costs MuJoCo less; that restarts every 200 steps, so that the block is still on its corner. Ratios are medians over
+pairs.
 """
 
 import tempfile
@@ -40,19 +42,41 @@ def bare(run: Run, steps: int) -> float:
     return spent / (steps // RESTART * RESTART)
 
 
-def open_loop(run: Run, steps: int, *, sensors: bool = True) -> float:
-    """Seconds a step of `Batch.step` alone, all worlds: the model that the loop steps, or it without sensors."""
+def fleet_model(run: Run) -> mujoco.MjModel:
+    """The model that the loop steps, sensors included."""
     spec = load(run.scenario.path, run.scenario.actual)
-    model = instrument(spec, run.truth, TABLE)[0] if sensors else spec.compile()
-    batch = Batch(model, run.worlds)
-    spent = 0.0
+    return instrument(spec, run.truth, TABLE, run.points)[0]
+
+
+def replay(run: Run) -> float:
+    """Seconds a step of `Batch.step` alone, all worlds, with the wrenches of the run: the same motion, open loop."""
+    batch, steps = Batch(fleet_model(run), run.worlds, persistent=True), run.time.size - 1
+    batch.bind("qpos")[:], batch.bind("qvel")[:] = run.start
+    wrench = np.ascontiguousarray(np.moveaxis(run.wrench_world, 1, 0))
+    xfrc, stage = batch.bind("xfrc_applied")[:, run.truth.index], int(mujoco.mjtStage.mjSTAGE_VEL)
+    batch.forward(stage=stage)
+    start = perf_counter()
+    for k in range(steps):
+        xfrc[:] = wrench[k]
+        batch.step(stage=stage)
+    spent = perf_counter() - start
+    assert np.array_equal(batch.bind("sensordata")[:, 3:7], run.quaternion[:, -1])
+    return spent / steps
+
+
+def constant(run: Run, steps: int) -> float:
+    """Seconds a step of `Batch.step` alone, all worlds, with a constant wrench."""
+    model = fleet_model(run)
+    batch = Batch(model, run.worlds, persistent=True)
+    stage, spent = int(mujoco.mjtStage.mjSTAGE_VEL), 0.0
     for _ in range(max(1, steps // RESTART)):
         batch.reset(stage=int(mujoco.mjtStage.mjSTAGE_NONE))
-        batch.qpos = model.keyframe("start").qpos
+        batch.bind("qpos")[:] = model.keyframe("start").qpos
         batch.bind("xfrc_applied")[:, run.truth.index] = run.wrench_world[0, 50]
+        batch.forward(stage=stage)
         start = perf_counter()
         for _ in range(RESTART):
-            batch.step()
+            batch.step(stage=stage)
         spent += perf_counter() - start
     return spent / (max(1, steps // RESTART) * RESTART)
 
@@ -68,11 +92,10 @@ def measure(quick: bool) -> dict[str, float]:
         pairs.append((closed.wall_s / steps, bare(closed, steps), float(np.median(closed.control_us))))
     one = np.array(pairs)
     fleet = []
-    for _ in range(max(3, rounds // 5)):
+    for _ in range(rounds):
         many = simulate(SCENARIO, worlds=256, seconds=0.2, hold=0.05)
         steps_many = many.time.size - 1
-        alone = open_loop(many, steps_many), open_loop(many, steps_many, sensors=False)
-        fleet.append((many.wall_s / steps_many, *alone))
+        fleet.append((many.wall_s / steps_many, replay(many), constant(many, steps_many)))
     pair = np.array(fleet)
     return {
         "one world: closed / bare mj_step": float(np.median(one[:, 0] / one[:, 1])),
@@ -80,7 +103,7 @@ def measure(quick: bool) -> dict[str, float]:
         "one world: bare mj_step, us": 1e6 * float(np.median(one[:, 1])),
         "one world: state, solve, certify, us": float(np.median(one[:, 2])),
         "256 worlds: closed / open Batch.step": float(np.median(pair[:, 0] / pair[:, 1])),
-        "256 worlds: closed / open without sensors": float(np.median(pair[:, 0] / pair[:, 2])),
+        "256 worlds: closed / constant wrench": float(np.median(pair[:, 0] / pair[:, 2])),
         "256 worlds: closed, us a step and world": 1e6 / 256 * float(np.median(pair[:, 0])),
         "256 worlds: open, us a step and world": 1e6 / 256 * float(np.median(pair[:, 1])),
         "recording written when the loop is over, s": recorded(rounds),

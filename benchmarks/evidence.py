@@ -76,5 +76,9 @@ if __name__ == "__main__":
         "balance-2d: slip_max_m": 2e-5,
         "pivot-2d: slip_max_m": 2e-5,
         "snap-2d: slip_max_m": 1e-4,
+        **{f"{name}: slip_max_m": 1e-4 for name in SCENARIOS if name.endswith("3d")},
+        **{f"{name}: angle_error_rms_deg": 0.05 for name in SCENARIOS if name.endswith("3d")},
+        **{f"{name}: force_mismatch_rel": 0.03 for name in SCENARIOS if name.endswith("3d")},
+        **{f"{name}: contact_lost_s": 0.0 for name in SCENARIOS},
     }
     main(__doc__ or "", measure, bounds)

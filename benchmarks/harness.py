@@ -5,11 +5,13 @@ import json
 import os
 import platform
 from collections.abc import Callable
-from importlib.metadata import version
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 PACKAGES = ("mujoco", "numpy", "numba", "clarabel", "qpsolvers", "daqp", "quadprog", "piqp")
+PEERS = ("casadi", "cvxopt", "cvxpy", "drake", "ecos", "highspy", "osqp", "proxsuite", "qoco", "scs")  # may be missing
 
 
 def machine() -> dict[str, Any]:
@@ -19,33 +21,49 @@ def machine() -> dict[str, Any]:
     if cpuinfo.exists():
         names = [line.partition(":")[2].strip() for line in cpuinfo.read_text().splitlines() if "model name" in line]
         model = names[0] if names else model
+    versions = {name: version(name) for name in PACKAGES}
+    for name in PEERS:
+        with suppress(PackageNotFoundError):
+            versions[name] = version(name)
     return {
         "processor": model,
         "cores": os.cpu_count(),
         "python": platform.python_version(),
-        "versions": {name: version(name) for name in PACKAGES},
+        "versions": versions,
     }
 
 
-def main(description: str, measure: Callable[[bool], dict[str, float]], bounds: dict[str, float]) -> None:
+def main(
+    description: str,
+    measure: Callable[[bool], dict[str, float]],
+    bounds: dict[str, float],
+    *,
+    floors: dict[str, float] | None = None,
+    markdown: Callable[[dict[str, float]], str] | None = None,
+) -> None:
     """Run a benchmark from the command line.
 
     Args:
         description: what it measures.
         measure: called with True for a quick run; gives its figures by name.
         bounds: greatest value of a figure that is asked for; the exit code is 1 if one is exceeded.
+        floors: least value of a figure that is asked for; likewise.
+        markdown: renders the figures of a saved run, for `--markdown FILE`.
     """
+    floors = floors or {}
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--quick", action="store_true", help="fewer repetitions")
     parser.add_argument("--json", type=Path, metavar="FILE", help="save figures and machine")
     parser.add_argument("--compare", type=Path, metavar="FILE", help="show the figures of a saved run beside these")
+    if markdown is not None:
+        parser.add_argument(
+            "--markdown", type=Path, metavar="FILE", help="print a saved run as tables, measure nothing"
+        )
     args = parser.parse_args()
-    saved: dict[str, float] = {}
-    if args.compare is not None:
-        try:
-            saved = json.loads(args.compare.read_text())["figures"]
-        except (OSError, ValueError, KeyError) as error:
-            parser.error(f"--compare {args.compare}: not a saved result ({error})")
+    if markdown is not None and args.markdown is not None:
+        print(markdown(_figures(parser, "--markdown", args.markdown)))
+        return
+    saved = {} if args.compare is None else _figures(parser, "--compare", args.compare)
     figures = measure(args.quick)
     width = max(map(len, figures))
     print(f"{'':{width}}  {'now':>10}" + (f"  {'saved':>10}" if saved else "") + "   asked")
@@ -55,8 +73,20 @@ def main(description: str, measure: Callable[[bool], dict[str, float]], bounds: 
             row += f"  {saved[name]:10.4g}" if name in saved else f"  {'-':>10}"
         if name in bounds:
             row += f"   <= {bounds[name]:g}" + ("" if value <= bounds[name] else "  EXCEEDED")
+        if name in floors:
+            row += f"   >= {floors[name]:g}" + ("" if value >= floors[name] else "  MISSED")
         print(row)
     if args.json is not None:
-        result = {"figures": figures, "bounds": bounds, "quick": args.quick, "machine": machine()}
+        result = {"figures": figures, "bounds": bounds, "floors": floors, "quick": args.quick, "machine": machine()}
         args.json.write_text(json.dumps(result, indent=1) + "\n")
-    raise SystemExit(any(figures[name] > bound for name, bound in bounds.items()))
+    exceeded = any(figures[name] > bound for name, bound in bounds.items())
+    raise SystemExit(exceeded or any(figures[name] < floor for name, floor in floors.items()))
+
+
+def _figures(parser: argparse.ArgumentParser, option: str, path: Path) -> dict[str, float]:
+    """The figures of a saved run, or a line that says what is wrong with the file."""
+    try:
+        figures: dict[str, float] = json.loads(path.read_text())["figures"]
+    except (OSError, ValueError, KeyError) as error:
+        parser.error(f"{option} {path}: not a saved result ({error})")
+    return figures

@@ -6,7 +6,7 @@ from pivoting.controller.closed_form import balancing_wrench, planar_force, redu
 from pivoting.controller.interior_point import EXACT, contact_forces, scratch_size, views
 from pivoting.controller.kernel import inlined
 from pivoting.controller.polish import polish
-from pivoting.controller.spatial_form import spatial_force
+from pivoting.controller.spatial_form import INSIDE, spatial_force
 from pivoting.controller.validate import Array
 
 
@@ -30,24 +30,30 @@ def smallest_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, reduced, scratch):  # type:
         J: (nw, K d); b: (nw,) [N, N m]; Q_w: (nw, nw); Q_f: (K d, K d); mu (planned), f_min [N]: (K,).
         reduced, scratch: of `workspace(nw, K, d)`.
     """
-    n = f.shape[0]
+    n, K = f.shape[0], mu.shape[0]
+    H, h = reduced[:n], reduced[n]
+    reduce(J, b, Q_w, Q_f, H, h, reduced[n + 1])
     if scratch is None:
-        reduce(J, b, Q_w, Q_f, reduced[:n], reduced[n], reduced[n + 1])
-        planar_force(reduced[:n], reduced[n], mu[0], f_min[0], f)
+        planar_force(H, h, mu[0], f_min[0], f)
         balancing_wrench(J, b, f, w)
         return kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f)
-    K = mu.shape[0]
-    work = views(scratch, J.shape[0], K, n // K)
-    H, h = work.H, work.h
-    reduce(J, b, Q_w, Q_f, H, h, work.x)
     if not np.isfinite(H.sum() + h.sum() + mu.sum() + f_min.sum()):
         f[:] = np.nan
         w[:] = np.nan
         return np.nan
-    if K == 1:
-        work.piece[0] = spatial_force(H, h, mu[0], f_min[0], f)
+    piece = INSIDE
+    if K == 1:  # exact up to eps cond(H): most problems need no more
+        piece = spatial_force(H, h, mu[0], f_min[0], f)
         balancing_wrench(J, b, f, w)
-        polish(J, Q_w, Q_f, H, mu, f_min, n, work.piece, f, w, work)
+        residual = kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f)
+        if residual <= EXACT:
+            return residual
+    work = views(scratch, J.shape[0], K, n // K)
+    work.H[:] = H
+    work.h[:] = h
+    if K == 1:
+        work.piece[0] = piece
+        polish(J, Q_w, Q_f, work.H, mu, f_min, n, work.piece, f, w, work)
         residual = kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f)
         if residual <= EXACT:
             return residual

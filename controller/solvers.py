@@ -1,8 +1,11 @@
 """Solving a wrench problem: compiled kernels, Clarabel, or any QP backend of qpsolvers; every answer is certified."""
 
+import contextlib
+import os
 import warnings
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -74,7 +77,7 @@ def pyramid_excess(problem: WrenchProblem, edges: int = EDGES, *, backend: str =
 
 
 def methods() -> tuple[str, ...]:
-    """Every method that `solve` can use here: the backends of qpsolvers depend on what is installed."""
+    """Every method that `solve` can use here: the backends of qpsolvers depend on what is installed and licensed."""
     return ("closed-form", "clarabel", *(f"qp:{name}" for name in sorted(_backends())))
 
 
@@ -106,11 +109,30 @@ def _route(method: str) -> Callable[[WrenchProblem, Options, int], Answer]:
     raise fail("method", method, "one of closed-form, clarabel, qp:<backend>")
 
 
+@cache
 def _backends() -> list[str]:
+    """The backends of qpsolvers that solve min x^2 / 2 s.t. x >= 1: one that is installed may lack its licence."""
     with warnings.catch_warnings():  # qpsolvers warns about deprecated backends when it is imported
         warnings.simplefilter("ignore")
         import qpsolvers
-    return list(qpsolvers.available_solvers)
+        from scipy import sparse
+
+    one = np.ones((1, 1))
+    answering = []
+    for name in qpsolvers.available_solvers:
+        if name == "mosek" and not _mosek_licence():
+            continue
+        P, G = (one, -one) if name in qpsolvers.dense_solvers else (sparse.csc_matrix(one), sparse.csc_matrix(-one))
+        with contextlib.suppress(Exception), warnings.catch_warnings():  # each backend has exceptions of its own
+            warnings.simplefilter("ignore")
+            if qpsolvers.solve_problem(qpsolvers.Problem(P, np.zeros(1), G, -np.ones(1)), solver=name).found:
+                answering.append(name)
+    return answering
+
+
+def _mosek_licence() -> bool:
+    """Without one Mosek complains on stdout, where `--json` promises only JSON; Drake's wheel brings it along."""
+    return "MOSEKLM_LICENSE_FILE" in os.environ or (Path.home() / "mosek" / "mosek.lic").exists()
 
 
 def _compiled(problem: WrenchProblem, options: Options, edges: int) -> Answer:
@@ -137,6 +159,6 @@ def _qp(backend: str, problem: WrenchProblem, options: Options, edges: int) -> A
     stated = qpsolvers.Problem(P, np.zeros(form.P.shape[0]), C, form.d, A, form.b)
     try:
         answer = qpsolvers.solve_problem(stated, solver=backend, **{**_TIGHT.get(backend, {}), **options})
-    except qpsolvers.exceptions.SolverError as error:
+    except Exception as error:  # each backend has its own: what it says is kept, and there is no answer
         return split(problem, None, f"{type(error).__name__}: {error}", unit)
     return split(problem, answer.x, "found" if answer.found else "not found", unit)

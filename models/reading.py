@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 PLANAR_JOINTS = "two perpendicular slides and then a hinge about their normal"
+JOINTS = f"a free joint, or {PLANAR_JOINTS}"
 
 
 class ModelError(ValueError):
@@ -15,26 +16,29 @@ class ModelError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class PlanarBody:
-    """A body that moves in a plane, as its model describes it.
+class RigidBody:
+    """A body that moves in a plane or in space, as its model describes it.
 
-    Object axes are (u, o, v): u the in-plane body axis that lies along the table at theta = 0, o the plane's normal.
+    Object axes sit at the CoM. In the plane they are (u, o, v): u the in-plane body axis that lies along the table at
+    theta = 0, o the plane's normal; in space they are the body frame's.
 
     Attributes:
         name: of the body.  index: its id.
-        mass: [kg].  inertia: about the CoM and the plane's normal [kg m^2].
+        dim: 2 (two slides and a hinge) or 3 (a free joint).
+        mass: [kg].  inertia: about the CoM [kg m^2]; in the plane a number, in space (3, 3) in object axes.
         com: (3,) CoM in the body frame [m].
         axes: (4,) quaternion, object axes to body frame.
         support: id of the geom it stands on.
         table: (4,) quaternion of the table's frame (t, o, n) in the world; t is to the right, n the support's normal.
-        origin: (3,) the support's position in the world [m].
+        origin: (3,) a point of the support's surface in the world [m].
         gravity: (3,) world axes [m/s^2].
     """
 
     name: str
     index: int
+    dim: int
     mass: float
-    inertia: float
+    inertia: float | Array
     com: Array
     axes: Array
     support: int
@@ -43,20 +47,22 @@ class PlanarBody:
     gravity: Array
 
     def point(self, contact: ArrayLike) -> Array:
-        """(2,) from the CoM along the object's in-plane axes (u, v) of a point given in the body frame.
+        """(d,) from the CoM in object axes, in the plane along (u, v), of a point given in the body frame.
 
         Args:
-            contact: (3,) in the body frame, or (2,) along (u, v) from the body's origin [m].
+            contact: (3,) in the body frame; in the plane also (2,) along (u, v) from the body's origin [m].
         """
         given = np.asarray(contact)
+        allowed = "2 in-plane or 3 body-frame coordinates [m]" if self.dim == 2 else "3 body-frame coordinates [m]"
         if given.dtype.kind not in "iuf":
-            raise ModelError(f"contact = {contact!r}: must be 2 in-plane or 3 body-frame coordinates [m]")
+            raise ModelError(f"contact = {contact!r}: must be {allowed}")
         R = matrix(self.axes)
+        used = [0, 2] if self.dim == 2 else [0, 1, 2]
         if given.shape == (3,) and np.isfinite(given).all():
-            return (R.T @ (given - self.com))[[0, 2]]
-        if given.shape == (2,) and np.isfinite(given).all():
-            return given - (R.T @ self.com)[[0, 2]]
-        raise ModelError(f"contact = {given.tolist()}: must be 2 in-plane or 3 body-frame coordinates [m], finite")
+            return (R.T @ (given - self.com))[used]
+        if self.dim == 2 and given.shape == (2,) and np.isfinite(given).all():
+            return given - (R.T @ self.com)[used]
+        raise ModelError(f"contact = {given.tolist()}: must be {allowed}, finite")
 
 
 def matrix(quaternion: Array) -> Array:
@@ -73,12 +79,12 @@ def quaternion(rotation: Array) -> Array:
     return out
 
 
-def read_body(model: mujoco.MjModel, name: str, support: str | None = None) -> PlanarBody:
-    """What the controller needs to know about a planar body of `model`.
+def read_body(model: mujoco.MjModel, name: str, support: str | None = None) -> RigidBody:
+    """What the controller needs to know about a body of `model`.
 
     Args:
         model: any compiled model.
-        name: a body at the top level, moving by two slides and a hinge, and nothing hanging on it.
+        name: a body at the top level, moving freely or by two slides and a hinge, and nothing hanging on it.
         support: name of the plane or box geom it stands on; by default the only plane of the world body.
 
     Raises:
@@ -90,42 +96,47 @@ def read_body(model: mujoco.MjModel, name: str, support: str | None = None) -> P
     index = model.body(name).id
     joints = range(model.body_jntadr[index], model.body_jntadr[index] + model.body_jntnum[index])
     kinds = [int(model.jnt_type[j]) for j in joints]
-    slide, hinge = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
+    slide, hinge, free = (int(getattr(mujoco.mjtJoint, f"mjJNT_{kind}")) for kind in ("SLIDE", "HINGE", "FREE"))
     if not kinds:
-        raise ModelError(f"body = {name!r}: it has no joint, so no free motion; needs {PLANAR_JOINTS}")
+        raise ModelError(f"body = {name!r}: it has no joint, so no free motion; needs {JOINTS}")
     if model.body_parentid[index] != 0:
         raise ModelError(f"body = {name!r}: it hangs on another body; must be a child of the world")
-    if kinds != [slide, slide, hinge]:
+    if kinds not in ([slide, slide, hinge], [free]):
         words = ", ".join(mujoco.mjtJoint(kind).name.removeprefix("mjJNT_").lower() for kind in kinds)
-        raise ModelError(f"body = {name!r}: its joints are {words}; a planar body needs {PLANAR_JOINTS}")
+        raise ModelError(f"body = {name!r}: its joints are {words}; needs {JOINTS}")
     if (model.body_parentid[1:] == index).any():
         raise ModelError(f"body = {name!r}: other bodies hang on it; their mass would not be counted")
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    first, second, normal = (data.xaxis[j] for j in joints)
-    if abs(first @ second) > 1e-6 or max(abs(first @ normal), abs(second @ normal)) > 1e-6:
-        raise ModelError(f"body = {name!r}: its joint axes are not perpendicular; needs {PLANAR_JOINTS}")
+    dim = 3 if kinds == [free] else 2
+    normal = None
+    if dim == 2:
+        first, second, normal = (data.xaxis[j] for j in joints)
+        if abs(first @ second) > 1e-6 or max(abs(first @ normal), abs(second @ normal)) > 1e-6:
+            raise ModelError(f"body = {name!r}: its joint axes are not perpendicular; needs {PLANAR_JOINTS}")
     _refuse_other_forces(model, name, index, joints)
     ground = read_support(model, support)
     if model.body_weldid[model.geom_bodyid[ground]] != 0:
         raise ModelError(f"support = {model.geom(ground).name!r}: it can move; must be fixed to the world")
     weightless = bool(model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY)
     gravity = np.zeros(3) if weightless else np.array(model.opt.gravity)
-    table = _table_axes(data.geom_xmat[ground].reshape(3, 3)[:, 2], normal, gravity)
-    body_to_world = data.xmat[index].reshape(3, 3)
-    axes = _object_axes(body_to_world.T @ table[:, 1])
+    surface = data.geom_xmat[ground].reshape(3, 3)
+    height = model.geom_size[ground, 2] if model.geom_type[ground] == int(mujoco.mjtGeom.mjGEOM_BOX) else 0.0
+    table = surface if normal is None else _table_axes(surface[:, 2], normal, gravity)
+    axes = np.eye(3) if normal is None else _object_axes(data.xmat[index].reshape(3, 3).T @ table[:, 1])
     inertial = matrix(model.body_iquat[index])
     tensor = inertial @ np.diag(model.body_inertia[index]) @ inertial.T
-    return PlanarBody(
+    return RigidBody(
         name=name,
         index=index,
+        dim=dim,
         mass=float(model.body_mass[index]),
-        inertia=float(axes[:, 1] @ tensor @ axes[:, 1]),
+        inertia=float(axes[:, 1] @ tensor @ axes[:, 1]) if dim == 2 else tensor,
         com=np.array(model.body_ipos[index]),
         axes=quaternion(axes),
         support=ground,
         table=quaternion(table),
-        origin=np.array(data.geom_xpos[ground]),
+        origin=data.geom_xpos[ground] + height * surface[:, 2],
         gravity=gravity,
     )
 
@@ -135,13 +146,13 @@ def _refuse_other_forces(model: mujoco.MjModel, name: str, index: int, joints: r
     if model.body_gravcomp[index] != 0.0:
         raise ModelError(f"body = {name!r}: it has gravcomp = {model.body_gravcomp[index]:g}; must have none")
     for joint in joints:
-        dof = int(model.jnt_dofadr[joint])
+        dofs = slice(model.jnt_dofadr[joint], model.body_dofadr[index] + model.body_dofnum[index])
         found = {
             "stiffness": np.abs(np.ravel(model.jnt_stiffness[joint])).max(),
             "limited": float(model.jnt_limited[joint]),
-            "damping": np.abs(np.ravel(model.dof_damping[dof])).max(),
-            "frictionloss": model.dof_frictionloss[dof],
-            "armature": model.dof_armature[dof],
+            "damping": np.abs(np.ravel(model.dof_damping[dofs])).max(),
+            "frictionloss": np.abs(np.ravel(model.dof_frictionloss[dofs])).max(),
+            "armature": np.abs(np.ravel(model.dof_armature[dofs])).max(),
         }
         for attribute, value in found.items():
             if value != 0.0:
@@ -200,18 +211,26 @@ def read_friction(model: mujoco.MjModel, body: int, support: int) -> float:
 
 
 def place(
-    model: mujoco.MjModel, data: mujoco.MjData, body: PlanarBody, theta: float, point: ArrayLike, at: ArrayLike
+    model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody, orientation: ArrayLike, point: ArrayLike, at: ArrayLike
 ) -> None:
-    """Set qpos so that the body is at angle `theta` [rad] with its `point` (3,) (body frame) `at` (3,) in the world.
+    """Set qpos so that the body is at an orientation with its `point` (3,) (body frame) `at` (3,) in the world.
+
+    Args:
+        orientation: (4,) quaternion, object axes to world; in the plane a turn in the plane.
 
     The joints' order (slides, then hinge) makes this exact. Velocities are left alone; kinematics are computed.
     """
     start = int(model.body_jntadr[body.index])
+    body_to_world = matrix(np.asarray(orientation)) @ matrix(body.axes).T
+    first = int(model.jnt_qposadr[start])
+    if body.dim == 3:
+        data.qpos[first + 3 : first + 7] = quaternion(body_to_world)
+        data.qpos[first : first + 3] = np.asarray(at, dtype=float) - body_to_world @ np.asarray(point, dtype=float)
+        mujoco.mj_kinematics(model, data)
+        return
     slots = model.jnt_qposadr[start : start + 3]
     mujoco.mj_kinematics(model, data)
-    table = matrix(body.table)
-    wanted = table @ matrix(np.array([np.cos(0.5 * theta), 0.0, -np.sin(0.5 * theta), 0.0]))
-    turn = wanted @ (data.xmat[body.index].reshape(3, 3) @ matrix(body.axes)).T
+    turn = body_to_world @ data.xmat[body.index].reshape(3, 3).T
     axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     along = data.xaxis[start + 2]
     data.qpos[slots[2]] += np.arctan2(axis @ along, np.trace(turn) - 1.0)
@@ -222,7 +241,7 @@ def place(
     mujoco.mj_kinematics(model, data)
 
 
-def turn(model: mujoco.MjModel, data: mujoco.MjData, body: PlanarBody, omega: ArrayLike, point: ArrayLike) -> None:
+def turn(model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody, omega: ArrayLike, point: ArrayLike) -> None:
     """Set qvel so that the body turns at `omega` (3,) [rad/s, world axes] about its `point` (3,) (body frame).
 
     Positions are as in `data`; other bodies' velocities are left alone.

@@ -3,7 +3,7 @@
 from pivoting.sim.attach import Attached, ControlError, attach
 from pivoting.sim.loop import simulate
 from pivoting.sim.run import Run
-from pivoting.sim.scenario import SCENARIOS, Scenario, scenario
+from pivoting.sim.scenario import SCENARIOS, Scenario, own_object, scenario
 from pivoting.sim.verdict import Check, Limits, assert_sticking, assert_tracking
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "assert_sticking",
     "assert_tracking",
     "attach",
+    "own_object",
     "scenario",
     "simulate",
 ]

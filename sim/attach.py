@@ -12,7 +12,7 @@ from pivoting.controller.solution import Solution
 from pivoting.controller.solvers import solve
 from pivoting.controller.space import Motion, quaternion_product
 from pivoting.controller.validate import fail
-from pivoting.models.reading import ModelError, PlanarBody, read_body, read_friction
+from pivoting.models.reading import ModelError, RigidBody, matrix, read_body, read_friction
 
 Array = NDArray[np.float64]
 
@@ -34,15 +34,17 @@ class Attached:
         controller: the `WrenchController` made from it.
     """
 
-    def __init__(self, model: mujoco.MjModel, body: PlanarBody, controller: WrenchController):
+    def __init__(self, model: mujoco.MjModel, body: RigidBody, controller: WrenchController):
         self.body = body
         self.controller = controller
         self._model = model
 
     def state(self, data: mujoco.MjData) -> Motion:
-        """Angle [rad] of the body from its table and rate [rad/s], from `data.qpos` and `data.qvel` as they are now.
+        """Orientation and rate of the body, from `data.qpos` and `data.qvel` as they are now.
 
-        The kinematics of `data` are recomputed: after `mj_step` they describe the state one step back.
+        In the plane the angle [rad] from its table and its rate [rad/s], in space the quaternion (4,) object to world
+        and the angular velocity (3,) in world axes. The kinematics of `data` are recomputed: after `mj_step` they
+        describe the state one step back.
         """
         if data.qpos.size != self._model.nq:
             raise fail("data", f"MjData with {data.qpos.size} positions", f"of the attached model ({self._model.nq})")
@@ -51,19 +53,23 @@ class Attached:
         mujoco.mj_kinematics(self._model, data)
         mujoco.mj_comPos(self._model, data)
         mujoco.mj_comVel(self._model, data)
-        omega = data.cvel[self.body.index, :3]
-        return Motion(float(self._angle(data)), float(omega @ self.controller.space.axial(1.0)))
+        q, omega = self._orientation(data), np.array(data.cvel[self.body.index, :3])
+        if self.body.dim == 3:
+            return Motion(q, omega)
+        space = self.controller.space
+        return Motion(float(space.angle(q)), float(omega @ space.axial(1.0)))
 
-    def _angle(self, data: mujoco.MjData) -> Array:
-        q = quaternion_product(np.array(data.xquat[self.body.index]), self.body.axes)
-        return self.controller.space.angle(q)
+    def _orientation(self, data: mujoco.MjData) -> Array:
+        """(4,) object axes to world, of the kinematics as they are."""
+        return quaternion_product(np.array(data.xquat[self.body.index]), self.body.axes)
 
-    def solution(self, data: mujoco.MjData, reference: float | Motion) -> Solution:
-        """The certified answer at the state of `data`: wrench in object axes, contact force in table axes (f_t, f_n).
+    def solution(self, data: mujoco.MjData, reference: ArrayLike | Motion) -> Solution:
+        """The certified answer at the state of `data`: wrench in object axes, contact forces (K, d) in table axes.
 
         Args:
             data: of the attached model.
-            reference: where the body should be now, an angle [rad] or a `Motion` (angle, rate, acceleration).
+            reference: where the body should be now: an angle [rad] or, in space, a quaternion (4,) object to world; or
+                a `Motion`, with rate and acceleration.
 
         Raises:
             ControlError: the state is not finite.
@@ -73,15 +79,14 @@ class Attached:
         target = reference if isinstance(reference, Motion) else Motion(reference)
         return solve(self.controller.problem(self.state(data), target))
 
-    def wrench(self, data: mujoco.MjData, reference: float | Motion) -> Array:
+    def wrench(self, data: mujoco.MjData, reference: ArrayLike | Motion) -> Array:
         """(6,) force [N] and torque [N m] at the CoM in world axes: assign it to `data.xfrc_applied[body]`.
 
         Arguments and errors as for `solution`.
         """
         answer = self.solution(data, reference)
-        q = quaternion_product(np.array(data.xquat[self.body.index]), self.body.axes)
         out = np.empty((1, 6))
-        world_wrench(self.controller.belief.wrench_map, q[None], answer.wrench[None], out)
+        world_wrench(self.controller.belief.wrench_map, self._orientation(data)[None], answer.wrench[None], out)
         return out[0]
 
 
@@ -98,15 +103,16 @@ def attach(
     Q_f: ArrayLike | None = None,
     support: str | None = None,
 ) -> Attached:
-    """Make a controller for a planar body of `model`: mass, inertia, CoM, gravity, friction and table are read from it.
+    """Make a controller for a body of `model`: mass, inertia, CoM, gravity, friction and table are read from it.
 
-    theta = 0 is where the body's first in-plane axis lies along the table, and grows counter-clockwise seen with the
-    table's tangent to the right and its normal up.
+    In the plane theta = 0 is where the body's first in-plane axis lies along the table, and grows counter-clockwise
+    seen with the table's tangent to the right and its normal up. In space orientations are those of the body frame.
 
     Args:
         model: any compiled model.
-        body: name of a top-level body that moves by two slides and a hinge.
-        contacts: the point that sticks, in the body frame: [(x, y, z)], or [(u, v)] along its in-plane axes [m].
+        body: name of a top-level body that moves freely, or by two slides and a hinge.
+        contacts: the points that stick, in the body frame: [(x, y, z), ...]; one point in the plane, where [(u, v)]
+            along the in-plane axes will do as well [m].
         law: default `Law.dynamic()`.
         mu: friction to plan with; default what MuJoCo combines from the geoms.
         margin: share of mu kept unused; exactly on the cone's edge nothing sticks.
@@ -121,15 +127,16 @@ def attach(
     if not isinstance(model, mujoco.MjModel):
         raise fail("model", model, "a mujoco.MjModel")
     found = read_body(model, body, support)
-    if not isinstance(contacts, Sequence | np.ndarray):
-        raise fail("contacts", contacts, "a list of one point")
+    if not isinstance(contacts, Sequence | np.ndarray) or len(contacts) == 0:
+        raise fail("contacts", contacts, "a list of at least one point")
     points = [found.point(contact) for contact in contacts]
-    if len(points) != 1:
+    if found.dim == 2 and len(points) != 1:
         raise ModelError(f"contacts = {[p.tolist() for p in points]}: must be one point for a planar body")
     friction = read_friction(model, found.index, found.support) if mu is None else mu
+    frame = None if found.dim == 2 else matrix(found.table)
     controller = WrenchController(
         Body(found.mass, found.inertia),
-        [Contact(point, friction, f_min) for point in points],
+        [Contact(point, friction, f_min, frame=frame) for point in points],
         Law.dynamic() if law is None else law,
         found.gravity,
         base=found.table,

@@ -5,9 +5,12 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from pivoting.sim.scenario import Scenario
 
 # MuJoCo, numba and rerun are imported by the commands that need them: `pivoting --help` answers at once.
 
@@ -82,14 +85,35 @@ def list_scenarios() -> int:
 @click.option(
     "--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key, or world.KEY for the world alone."
 )
+@click.option("--model", type=click.Path(path_type=Path), help="An MJCF file of your own, for the scenario pivot.")
+@click.option("--body", help="Name of the body in it that is pivoted.")
+@click.option(
+    "--contact", help='What it turns about: vertex, edge, lowest, or "x,y,z" or "x,y,z; x,y,z" in its frame, m.'
+)
+@click.option("--support", help="Name of the plane or box geom that it stands on; by default the only plane.")
+@click.option("--as-modelled", is_flag=True, help="Keep the file's contact and solver parameters.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for SCENARIO.rrd and summary.json.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object and nothing else.")
-def run(scenario: str, worlds: int, seed: int, settings: tuple[str, ...], out: Path | None, as_json: bool) -> int:
-    """Run SCENARIO in closed loop in MuJoCo; exit 0 if the verdict passes, 1 if it fails."""
+def run(
+    scenario: str,
+    worlds: int,
+    seed: int,
+    settings: tuple[str, ...],
+    out: Path | None,
+    as_json: bool,
+    **own: Any,
+) -> int:
+    """Run SCENARIO in closed loop in MuJoCo; exit 0 if the verdict passes, 1 if it fails.
+
+    The scenario pivot takes an object of your own: --model FILE.xml --body NAME --contact vertex.
+    """
     from pivoting.sim.loop import simulate
     from pivoting.sim.scenario import scenario as find
 
-    case = find(scenario).change(**_settings(settings))
+    case = (_own(**own) if scenario == "pivot" else find(scenario)).change(**_settings(settings))
+    if scenario != "pivot" and any(own.values()):
+        option = next(key for key, value in own.items() if value)
+        raise click.BadParameter(f"--{option.replace('_', '-')}: only the scenario pivot takes it, not {scenario!r}")
     if out is not None:
         _make_folder(out)
     with _progress(f"{scenario}, {worlds} world{'s' * (worlds > 1)}") as report:
@@ -147,6 +171,26 @@ def _settings(pairs: tuple[str, ...]) -> dict[str, Any]:
             raise click.BadParameter(f"--set {pair!r}: must be KEY=VALUE")
         out[key] = value
     return out
+
+
+def _own(
+    model: Path | None, body: str | None, contact: str | None, support: str | None, as_modelled: bool
+) -> "Scenario":
+    """The scenario of an object of one's own."""
+    from pivoting.sim.scenario import own_object
+
+    for option, value in (("--model", model), ("--body", body)):
+        if value is None:
+            raise click.BadParameter(f"{option} is missing: pivot needs --model FILE.xml --body NAME")
+    assert model is not None
+    assert body is not None
+    where: str | list[list[float]] = contact or "lowest"
+    if contact is not None and "," in contact:
+        try:
+            where = [[float(number) for number in point.split(",")] for point in contact.split(";")]
+        except ValueError:
+            raise click.BadParameter(f'--contact {contact!r}: must be "x,y,z" or "x,y,z; x,y,z"') from None
+    return own_object(model, body, where, support=support, chosen=not as_modelled)
 
 
 def _make_folder(out: Path) -> None:

@@ -41,14 +41,20 @@ class ContactRows(NamedTuple):
     h: float
 
 
-def read_rows(model: mujoco.MjModel, data: mujoco.MjData) -> ContactRows | None:
-    """The contact rows of `data` after `mj_forward`; None where there is no contact."""
-    if data.ncon == 0:
+def read_rows(model: mujoco.MjModel, data: mujoco.MjData, body: int, support: int) -> ContactRows | None:
+    """The contact rows between a body and a geom of `data` after `mj_forward`; None where there is no contact."""
+    ends = [model.geom_bodyid[contact.geom] for contact in data.contact]
+    own = [
+        contact
+        for contact, bodies in zip(data.contact, ends, strict=True)
+        if support in contact.geom and body in bodies and contact.efc_address >= 0
+    ]
+    if not own:
         return None
-    row = int(data.contact[0].efc_address)
+    row = int(own[0].efc_address)
     stiffness, damping, impedance = data.efc_KBIP[row, :3]
     return ContactRows(
-        points=int(data.ncon),
+        points=len(own),
         R_n=float(data.efc_R[row]),
         R_t=float(data.efc_R[row + 1]),
         b=float(damping),
@@ -57,16 +63,19 @@ def read_rows(model: mujoco.MjModel, data: mujoco.MjData) -> ContactRows | None:
     )
 
 
-def drift(rows: ContactRows, r_t: Array, r_n: Array, omega: Array, force: Array) -> Array:
-    """Predicted velocity (...) [m/s] of the material corner along the table.
+def drift(rows: ContactRows, lever: Array, omega: Array, force: Array) -> Array:
+    """Predicted velocity (..., K, 2) [m/s] of K material points along the table, (t, o).
 
     Args:
-        rows: of the contact.
-        r_t, r_n: (...) from the CoM to the corner along the table and along its normal [m].
-        omega: (...) rate of turn [rad/s].
-        force: (..., 2) predicted contact force (f_t, f_n) [N].
+        rows: of the contact, whose points share the load of the K.
+        lever: (..., K, 3) from the CoM to each point, table axes [m].
+        omega: (..., 3) angular velocity, table axes [rad/s].
+        force: (..., K, 3) predicted contact forces (f_t, f_o, f_n) [N].
     """
-    c_t, c_n = -(omega**2) * r_t, -(omega**2) * r_n
-    f_t, f_n = force[..., 0] / rows.points, force[..., 1] / rows.points
-    depth = np.maximum(rows.R_n * f_n - c_n * (1.0 - 0.5 * rows.b * rows.h), 0.0) / rows.k
-    return -rows.R_t * f_t / rows.b + c_t * (1.0 / rows.b - 0.5 * rows.h) + 0.5 * omega * depth
+    turning = np.broadcast_to(omega[..., None, :], lever.shape)
+    c = np.cross(turning, np.cross(turning, lever))
+    load = force * (force.shape[-2] / rows.points)
+    depth = np.maximum(rows.R_n * load[..., 2] - c[..., 2] * (1.0 - 0.5 * rows.b * rows.h), 0.0) / rows.k
+    below = -0.5 * depth[..., None] * np.array([0.0, 0.0, 1.0])  # from the constrained point to the material one
+    drifts = -rows.R_t * load / rows.b + c * (1.0 / rows.b - 0.5 * rows.h) + np.cross(turning, below)
+    return drifts[..., :2]

@@ -9,18 +9,20 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 from pivoting.controller.controller import WrenchController, step_worlds, world_wrench
-from pivoting.controller.space import space
+from pivoting.controller.rotations import Turn
+from pivoting.controller.space import quaternion_product, space
 from pivoting.controller.validate import fail
-from pivoting.models.reading import PlanarBody, matrix, place, read_body, read_friction, turn
-from pivoting.models.scenes import BODY, TABLE, compiled, corner, instrument, load
+from pivoting.models.reading import RigidBody, matrix, place, read_friction, turn
+from pivoting.models.scenes import compiled, instrument, load
 from pivoting.sim.attach import Attached, attach
-from pivoting.sim.fidelity import read_rows
+from pivoting.sim.fidelity import ContactRows, read_rows
+from pivoting.sim.plan import Plan, planned
 from pivoting.sim.run import Run
-from pivoting.sim.scenario import CONTROL_KEYS, LOWEST, Scenario, scenario
+from pivoting.sim.scenario import CONTROL_KEYS, Scenario, scenario
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-9  # relative KKT residual of an answer that counts as solved
-START_DEPTH = 1e-6  # [m]: there is contact from the first step on
+START_DEPTH = 1e-6  # of the lever from contact to CoM: there is contact from the first step on
 MAX_STEPS = 10_000_000  # worlds times steps that are kept in memory, about 0.5 kB each
 
 
@@ -55,10 +57,12 @@ def simulate(
             raise fail(key, value, f"a whole number >= {least}")
     if case.gravity == 0.0 and case.f_min == 0.0:
         raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the corner on the table")
-    attached = believe(case, controller)
-    spec = load(case.path, case.actual)
-    truth = read_body(compiled(spec), BODY, TABLE)
-    model, where = instrument(spec, truth, TABLE)
+    attached, believed = believe(case, controller)
+    spec = load(case.path, case.actual, body=case.body, support=case.support, chosen=case.chosen)
+    bare = compiled(spec)
+    plan = planned(case, bare)
+    truth = plan.body
+    model, where = instrument(spec, truth, bare.geom(truth.support).name, plan.contacts)
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that diverges is seen, not reset
     dt = float(model.opt.timestep)
     steps = round(case.duration / dt)
@@ -68,43 +72,47 @@ def simulate(
     if steps * dt <= case.limits.settle_s:
         raise fail("seconds", case.duration, f"more than the {case.limits.settle_s:g} s that the verdict lets settle")
     time: Array = dt * np.arange(steps + 1, dtype=float)
-    desired = _desired(case, time)
-    for values in (time, *desired):
+    reference, desired = _desired(case, plan, time)
+    told = _desired(case, believed, time)[1]  # the controller knows only the table that it believes in
+    for values in (time, *reference, *desired):
         values.flags.writeable = False
 
     batch = Batch(model, int(worlds), nthread=1 if worlds == 1 else 0, persistent=True)
-    data = mujoco.MjData(model)
-    at = truth.origin - START_DEPTH * matrix(truth.table)[:, 2]
     errors = np.deg2rad(case.spread) * np.random.default_rng(seed).uniform(-1.0, 1.0, int(worlds))
-    omega = space(2, truth.table).axial(desired[1][0])
-    for qpos, qvel, error in zip(batch.bind("qpos"), batch.bind("qvel"), errors, strict=True):
-        place(model, data, truth, float(desired[0][0] + error), corner(model), at)
-        turn(model, data, truth, omega, corner(model))
-        qpos[:], qvel[:] = data.qpos, data.qvel
-    mujoco.mj_forward(model, data)
-    rows = read_rows(model, data)
+    rows = _start(batch, model, plan, desired, errors)
+    start = (np.array(batch.bind("qpos")), np.array(batch.bind("qvel")))
+    for values in start:
+        values.flags.writeable = False
 
-    log = _loop(batch, attached.controller, truth, where, desired, progress)
+    log = _loop(batch, attached.controller, truth, where, told, progress)
+    K, d = len(plan.contacts), truth.dim
     read = {key: log.sensors[..., columns] for key, columns in where.items()}
-    table = matrix(truth.table)[:, [0, 2]]
+    forces = [read["contact"]] if K == 1 else [read[f"contact {i}"] for i in range(K)]
+    axes = matrix(truth.table) @ space(d).force_map
+    measured = np.stack([force[1:, :, 1:4] @ axes for force in forces], axis=2)
     return Run(
         scenario=case,
         seed=int(seed),
         attached=attached,
         truth=truth,
-        corner_point=truth.point(corner(model)),
+        points=np.array([space(d).lift(truth.point(contact)) for contact in plan.contacts]),
+        face=np.array([space(d).lift(truth.point(corner)) for corner in plan.face]),
+        turn=(plan.axis, plan.start),
         mu_world=read_friction(model, truth.index, truth.support),
         contact_rows=rows,
+        start=start,
         time=time,
-        reference=desired,
+        reference=reference,
+        desired=desired,
         position=_worlds_first(read["position"]),
         quaternion=_worlds_first(read["quaternion"]),
         velocity=_worlds_first(read["velocity"]),
         angular_velocity=_worlds_first(read["angular_velocity"]),
         wrench=_worlds_first(log.wrench),
         wrench_world=_worlds_first(log.wrench_world),
-        force=_worlds_first(log.force).reshape(worlds, steps, 1, 2),
-        force_measured=_worlds_first(read["contact"][1:, :, 1:4] @ table).reshape(worlds, steps, 1, 2),
+        force=_worlds_first(log.force).reshape(worlds, steps, K, d),
+        force_measured=_worlds_first(measured),
+        contacts_found=_worlds_first(read["contact"][1:, :, 0]),
         residual=_worlds_first(log.residual),
         status=_worlds_first(log.status),
         control_us=_worlds_first((log.control_ns / (1e3 * worlds))[:, None])[0],
@@ -113,33 +121,57 @@ def simulate(
     )
 
 
-def believe(case: Scenario, controller: WrenchController | None = None) -> Attached:
-    """The controller of a scenario (or another), attached to the world that the scenario believes in."""
-    nominal = compiled(load(case.path, case.believed))
+def _start(
+    batch: Batch, model: mujoco.MjModel, plan: Plan, desired: tuple[Array, Array, Array], errors: Array
+) -> ContactRows | None:
+    """Put every world on its contact, off the reference by `errors` (W,) [rad]; its contact rows."""
+    body = plan.body
+    data = mujoco.MjData(model)
+    lever = float(np.linalg.norm(body.com - plan.contacts[0]))
+    at = plan.at - START_DEPTH * lever * matrix(body.table)[:, 2]
+    for qpos, qvel, error in zip(batch.bind("qpos"), batch.bind("qvel"), errors, strict=True):
+        off = np.concatenate([[np.cos(0.5 * error)], np.sin(0.5 * error) * plan.axis])
+        place(model, data, body, quaternion_product(off, desired[0][0]), plan.contacts[0], at)
+        turn(model, data, body, desired[1][0], plan.contacts[0])
+        qpos[:], qvel[:] = data.qpos, data.qvel
+    mujoco.mj_forward(model, data)
+    return read_rows(model, data, body.index, body.support)
+
+
+def believe(case: Scenario, controller: WrenchController | None = None) -> tuple[Attached, Plan]:
+    """The controller of a scenario (or another) attached to the world that the scenario believes in, and its plan."""
+    nominal = compiled(load(case.path, case.believed, body=case.body, support=case.support, chosen=case.chosen))
+    plan = planned(case, nominal)
     if controller is not None:
         if not isinstance(controller, WrenchController):
             raise fail("controller", controller, "a WrenchController")
-        if [contact.dim for contact in controller.contacts] != [2]:
-            raise fail("controller", f"one with {len(controller.contacts)} contacts", "of one planar contact")
+        if [contact.dim for contact in controller.contacts] != [plan.body.dim] * len(plan.contacts):
+            kind = "planar" if plan.body.dim == 2 else "spatial"
+            given = f"one with {len(controller.contacts)} contacts in dimension {controller.space.dim}"
+            raise fail("controller", given, f"of {len(plan.contacts)} {kind} contact{'s' * (len(plan.contacts) > 1)}")
         ignored = [key for key in CONTROL_KEYS if key in case.changes]
         if ignored:
             raise fail(ignored[0], case.changes[ignored[0]], "left out: the controller that is given has its own")
-        return Attached(nominal, read_body(nominal, BODY, TABLE), controller)
-    return attach(
+        return Attached(nominal, plan.body, controller), plan
+    attached = attach(
         nominal,
-        body=BODY,
-        contacts=[corner(nominal)],
+        body=case.body,
+        contacts=list(plan.contacts),
         law=case.control_law(),
         mu=case.mu,
         margin=case.margin,
         f_min=case.f_min,
-        Q_w=case.wrench_weight(),
-        support=TABLE,
+        Q_w=case.wrench_weight(plan.body.dim),
+        support=case.support,
     )
+    return attached, plan
 
 
-def _desired(case: Scenario, time: Array) -> tuple[Array, Array, Array]:
-    """The reference at every step, checked: whatever it says of itself, it has to keep the block on its corner."""
+def _desired(case: Scenario, plan: Plan, time: Array) -> tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]]:
+    """The reference at every step, as angles and as orientations.
+
+    Checked: whatever it says of itself, it has to keep the object on its contact.
+    """
     angle, rate, acceleration = (np.array(values, dtype=float) for values in case.motion(time))
     for name, values in (("angle", angle), ("rate", rate), ("acceleration", acceleration)):
         if values.shape != time.shape or not np.isfinite(values).all():
@@ -147,9 +179,12 @@ def _desired(case: Scenario, time: Array) -> tuple[Array, Array, Array]:
                 "reference", f"{name} of shape {values.shape}", f"finite and of the shape of the times, {time.shape}"
             )
     low, high = np.rad2deg([angle.min(), angle.max()])
-    if not LOWEST <= low <= high <= 90.0 - LOWEST:
-        raise fail("reference", f"angles from {low:g} to {high:g} deg", f"in [{LOWEST}, {90.0 - LOWEST}] deg")
-    return angle, rate, acceleration
+    least, most = np.rad2deg(plan.range)
+    if not least - 1e-9 <= low <= high <= most + 1e-9:
+        raise fail("reference", f"angles from {low:g} to {high:g} deg", f"in [{least:.4g}, {most:.4g}] deg")
+    desired = Turn(case.motion, plan.axis, plan.start)(time)
+    q, omega, alpha = (np.array(values, dtype=float) for values in desired)
+    return (angle, rate, acceleration), (q, omega, alpha)
 
 
 class _Log(NamedTuple):
@@ -175,19 +210,18 @@ def _worlds_first(values: NDArray[Any]) -> NDArray[Any]:
 def _loop(
     batch: Batch,
     controller: WrenchController,
-    truth: PlanarBody,
+    truth: RigidBody,
     where: dict[str, slice],
     desired: tuple[Array, Array, Array],
     progress: Callable[[int, int], None] | None,
 ) -> _Log:
     """Step all worlds to the end."""
-    steps, worlds = desired[0].size - 1, batch.nsim
-    belief, space = controller.belief, controller.space
+    steps, worlds = len(desired[0]) - 1, batch.nsim
+    belief = controller.belief
     sensordata, xfrc = batch.bind("sensordata"), batch.bind("xfrc_applied")[:, truth.index]
     stage = int(mujoco.mjtStage.mjSTAGE_VEL)
     batch.forward(stage=stage)
     q, omega = sensordata[:, where["quaternion"]], sensordata[:, where["angular_velocity"]]
-    q_d, omega_d, alpha_d = space.orientation(desired[0]), space.axial(desired[1]), space.axial(desired[2])
     nw, n = belief.wrench_map.shape[0], belief.Q_f.shape[0]
     log = _Log(
         sensors=np.empty((steps + 1, *sensordata.shape)),
@@ -202,11 +236,10 @@ def _loop(
     sensors, wrench, wrench_world, force, residual, status, spent, _ = log
     work = controller.workspace()
     answers = (wrench, force, residual, status)
-    desired_now = (q_d, omega_d, alpha_d)
 
     def control(k: int) -> None:
         """State, solve and certify step k of every world."""
-        now, into = [values[k] for values in desired_now], [values[k] for values in answers]
+        now, into = [values[k] for values in desired], [values[k] for values in answers]
         step_worlds(belief, work, TOLERANCE, q, omega, *now, *into)
 
     control(0)  # compiled before it is timed

@@ -18,10 +18,12 @@ class Measures:
     """One value for each world, (W,); slip over the whole run, everything else after the scenario's `settle_s`.
 
     Attributes:
-        slip_max_m: greatest displacement of the material corner along the table from where it started.
+        slip_max_m: greatest displacement of a material contact point along the table from where it started.
         slip_floor_m: what the simulator's creep, rotation and penetration terms predict for it (`fidelity.drift`).
-        angle_error_rms_deg, angle_error_max_deg: theta against the reference.
-        contact_lost_s: time in which the contact sensor shows no push.
+        angle_error_rms_deg, angle_error_max_deg: orientation against the reference.
+        contact_lost_s: time in which the contact sensor shows no push on one of the contacts.
+        contacts_missing: how many fewer contacts there are at the end than the scenario asks for.
+        bounce_m: height that the landed face regains after the first moment with all these contacts.
         friction_use_max: measured |f_t| / (mu f_n) with the world's mu; nan if there never was a push.
         force_mismatch_rel: RMS of measured minus predicted contact force over RMS of the predicted.
         residual_max: greatest KKT residual; inf where a step had no answer.
@@ -33,6 +35,8 @@ class Measures:
     angle_error_rms_deg: Array
     angle_error_max_deg: Array
     contact_lost_s: Array
+    contacts_missing: Array
+    bounce_m: Array
     friction_use_max: Array
     force_mismatch_rel: Array
     residual_max: Array
@@ -45,32 +49,47 @@ def measure(run: "Run") -> Measures:
     settled = run.time >= run.scenario.limits.settle_s - 1e-12
     error = np.rad2deg(run.angle_error[:, settled])
     steps = settled[:-1]
-    measured, predicted = run.force_measured[:, steps, 0], run.force[:, steps, 0]
+    # a body that has landed shares the load among contacts that the controller does not count
+    counted = steps & ~(run.landed.any(axis=0) if run.scenario.limits.contacts_end else np.zeros_like(steps))
+    measured, predicted = run.force_measured[:, counted], run.force[:, counted]
     use = run.friction_use[:, steps]
     pushed = ~np.isnan(use)
+    lost = ~pushed.all(axis=2)
     mismatch = _rms(np.linalg.norm(measured - predicted, axis=-1)) / _rms(np.linalg.norm(predicted, axis=-1))
+    ever = pushed.any(axis=(1, 2))
     return Measures(
-        slip_max_m=np.abs(run.slip).max(axis=1),
-        slip_floor_m=np.abs(predicted_slip(run)).max(axis=1),
+        slip_max_m=np.linalg.norm(run.slip, axis=-1).max(axis=(1, 2)),
+        slip_floor_m=np.linalg.norm(predicted_slip(run), axis=-1).max(axis=(1, 2)),
         angle_error_rms_deg=_rms(error),
         angle_error_max_deg=np.abs(error).max(axis=1),
-        contact_lost_s=np.count_nonzero(~pushed, axis=1) * run.dt,
-        friction_use_max=np.where(pushed.any(axis=1), np.where(pushed, use, 0.0).max(axis=1), np.nan),
+        contact_lost_s=np.count_nonzero(lost, axis=1) * run.dt,
+        contacts_missing=np.maximum(run.scenario.limits.contacts_end - run.contacts_found[:, -1], 0.0),
+        bounce_m=_bounce(run),
+        friction_use_max=np.where(ever, np.where(pushed, use, 0.0).max(axis=(1, 2)), np.nan),
         force_mismatch_rel=mismatch,
         residual_max=np.where(np.isfinite(run.residual), run.residual, np.inf).max(axis=1),
         unsolved_steps=np.count_nonzero(run.status != 0, axis=1).astype(float),
     )
 
 
+def _bounce(run: "Run") -> Array:
+    """(W,) greatest clearance [m] of the landed face; 0 where nothing is to land, or has landed."""
+    if not run.scenario.limits.contacts_end:
+        return np.zeros(run.worlds)
+    after = np.logical_or.accumulate(run.landed, axis=1)
+    return np.where(after, run.clearance[:, 1:], 0.0).max(axis=1)
+
+
 def predicted_slip(run: "Run") -> Array:
-    """(W, N+1) the displacement [m] of the corner along the table that MuJoCo's contact model itself predicts."""
+    """(W, N+1, K, 2) the displacement [m] of each point along the table that MuJoCo's contact model itself predicts."""
     rows = run.contact_rows
     if rows is None:
         return np.full(run.slip.shape, np.nan)
-    r_t, r_n = np.moveaxis(run.lever[:, :-1], -1, 0)
-    speed = drift(rows, r_t, r_n, run.omega[:, :-1], run.force[:, :, 0])
-    return np.concatenate([np.zeros((run.worlds, 1)), np.cumsum(speed * run.dt, axis=1)], axis=1)
+    lift = run.attached.controller.space.lift
+    speed = drift(rows, run.lever[:, :-1], run.angular_velocity[:, :-1] @ run.table_axes, lift(run.force))
+    return np.concatenate([np.zeros_like(speed[:, :1]), np.cumsum(speed * run.dt, axis=1)], axis=1)
 
 
 def _rms(values: Array) -> Array:
-    return np.sqrt(np.mean(values**2, axis=1))
+    """Over steps, and over contacts where there are any."""
+    return np.sqrt(np.mean(values**2, axis=tuple(range(1, values.ndim))))

@@ -12,12 +12,14 @@ from rich.table import Table
 
 # name in the summary: (what people read, factor, unit)
 _LINES = {
-    "slip_max_m": ("slip of the corner", 1e3, "mm"),
+    "slip_max_m": ("slip of the contact", 1e3, "mm"),
     "angle_error_rms_deg": ("angle error, RMS", 1.0, "deg"),
     "angle_error_max_deg": ("angle error, greatest", 1.0, "deg"),
     "contact_lost_s": ("time without contact", 1.0, "s"),
     "friction_use_max": ("friction used, |f_t| / (mu f_n)", 1.0, ""),
     "force_mismatch_rel": ("contact force, predicted against measured", 100.0, "%"),
+    "contacts_missing": ("contacts missing at the end", 1.0, ""),
+    "bounce_m": ("height regained after landing", 1e3, "mm"),
     "unsolved_steps": ("steps without a certified answer", 1.0, ""),
 }
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.controller.space import Space, space
-from pivoting.models.reading import PlanarBody, matrix
+from pivoting.controller.space import Space, quaternion_product, space
+from pivoting.models.reading import RigidBody, matrix
 from pivoting.sim.attach import Attached
 from pivoting.sim.fidelity import ContactRows
 from pivoting.sim.monitor import Measures, measure
@@ -15,6 +15,7 @@ from pivoting.sim.scenario import Scenario
 from pivoting.sim.verdict import Check, judge
 
 Array = NDArray[np.float64]
+INVERSE = np.array([1.0, -1.0, -1.0, -1.0])  # of a unit quaternion, component by component
 
 
 def _frozen(values: Array) -> Array:
@@ -32,17 +33,23 @@ class Run:
         seed: of the worlds' initial errors.
         attached: the controller and what it believes.
         truth: the body as the world has it.
-        corner_point: (2,) the world's corner from the CoM, object axes [m].
+        points: (K, 3) the world's contact points from the CoM, object axes [m].
+        face: (P, 3) likewise, the corners of the face that the object lies on at angle 0.
+        turn: the axis (3,) [world axes] and the orientation (4,) at angle 0 that `theta` is counted from.
         mu_world: the world's friction.
         contact_rows: MuJoCo's contact at the start, for the predicted slip.
+        start: qpos (W, nq) and qvel (W, nv) of the worlds at time 0, from which the applied wrenches replay the run.
         time: (N+1,) [s].
         reference: desired angle, rate and acceleration, each (N+1,) [rad, s].
+        desired: the same as orientations (N+1, 4), angular velocities and accelerations (N+1, 3), world axes.
         position: (W, N+1, 3) CoM, world axes [m].  quaternion: (W, N+1, 4) object to world.
         velocity, angular_velocity: (W, N+1, 3) of the CoM, world axes [m/s, rad/s].
-        wrench: (W, N, 3) object axes (F_u, F_v, M) [N, N m]; nan where there was no answer, and then none is applied.
+        wrench: (W, N, 3 or 6) object axes, (F_u, F_v, M) in the plane [N, N m]; nan where there was no
+            answer, and then none is applied.
         wrench_world: (W, N, 6) applied force and torque at the CoM, world axes.
-        force: (W, N, 1, 2) contact force (f_t, f_n) predicted by the solution, table axes [N].
-        force_measured: (W, N, 1, 2) by MuJoCo's contact sensor, likewise.
+        force: (W, N, K, d) contact forces (f_t, f_n) or (f_t, f_o, f_n) predicted by the solution, table axes [N].
+        force_measured: (W, N, K, d) by MuJoCo's contact sensors, likewise.
+        contacts_found: (W, N) contacts between the body and its support, as MuJoCo counts them.
         residual: (W, N) relative KKT residuals.  status: (W, N) codes of `solution.STATUS`, 0 is solved.
         control_us: (N,) time to state, solve and certify the problem of one world [microseconds].
         wall_s: of the loop.
@@ -52,12 +59,16 @@ class Run:
     scenario: Scenario
     seed: int
     attached: Attached
-    truth: PlanarBody
-    corner_point: Array
+    truth: RigidBody
+    points: Array
+    face: Array
+    turn: tuple[Array, Array]
     mu_world: float
     contact_rows: ContactRows | None
+    start: tuple[Array, Array]
     time: Array
     reference: tuple[Array, Array, Array]
+    desired: tuple[Array, Array, Array]
     position: Array
     quaternion: Array
     velocity: Array
@@ -66,6 +77,7 @@ class Run:
     wrench_world: Array
     force: Array
     force_measured: Array
+    contacts_found: Array
     residual: Array
     status: NDArray[np.int8]
     control_us: Array
@@ -85,51 +97,77 @@ class Run:
     @cached_property
     def space(self) -> Space:
         """The plane of motion, with angles from the table that the world has, whatever the controller believes."""
-        return space(2, self.truth.table)
+        return space(self.truth.dim, self.truth.table)
 
     @cached_property
     def theta(self) -> Array:
-        """(W, N+1) angle from the world's table [rad]."""
-        return _frozen(self.space.angle(self.quaternion))
+        """(W, N+1) angle turned about the reference's axis [rad]; in the plane from the world's table."""
+        axis, start = self.turn
+        turned = quaternion_product(self.quaternion, start * INVERSE)
+        half = np.arctan2(turned[..., 1:] @ axis, turned[..., 0])
+        return _frozen(np.arctan2(np.sin(2.0 * half), np.cos(2.0 * half)))
 
     @cached_property
     def omega(self) -> Array:
-        """(W, N+1) rate of theta [rad/s]."""
-        return _frozen(self.angular_velocity @ self.space.axial(1.0))
+        """(W, N+1) rate of turn about the reference's axis [rad/s]."""
+        return _frozen(self.angular_velocity @ self.turn[0])
 
     @cached_property
     def angle_error(self) -> Array:
-        """(W, N+1) theta minus the reference [rad]."""
-        difference = self.theta - self.reference[0]
-        return _frozen(np.arctan2(np.sin(difference), np.cos(difference)))
+        """(W, N+1) angle from the desired orientation [rad], with its sign about the axis."""
+        turned = quaternion_product(self.quaternion, self.desired[0] * INVERSE)
+        turned *= np.where(turned[..., :1] < 0.0, -1.0, 1.0)  # the shorter way round
+        size = 2.0 * np.arctan2(np.linalg.norm(turned[..., 1:], axis=-1), turned[..., 0])
+        return _frozen(np.copysign(size, turned[..., 1:] @ self.turn[0]))
 
     @cached_property
     def table_axes(self) -> Array:
-        """(3, 2) the table's tangent and normal as columns, world axes."""
-        return matrix(self.truth.table)[:, [0, 2]]
+        """(3, 3) the table's axes (t, o, n) as columns, world axes."""
+        return matrix(self.truth.table)
 
     @cached_property
     def lever(self) -> Array:
-        """(W, N+1, 2) from the CoM to the material corner along the table's tangent and normal [m]."""
-        (u, v), s, c = self.corner_point, np.sin(self.theta), np.cos(self.theta)
-        return _frozen(np.stack([c * u - s * v, s * u + c * v], axis=-1))
+        """(W, N+1, K, 3) from the CoM to the material contact points, table axes [m]."""
+        return _frozen(self._from_com(self.points))
 
     @cached_property
     def corner(self) -> Array:
-        """(W, N+1, 2) material corner from the table's origin along its tangent and normal [m]."""
-        return _frozen((self.position - self.truth.origin) @ self.table_axes + self.lever)
+        """(W, N+1, K, 3) material contact points from the table's origin, table axes [m]."""
+        return _frozen(self._com[..., None, :] + self.lever)
+
+    @cached_property
+    def clearance(self) -> Array:
+        """(W, N+1) height above the table of the highest corner of the face that the object lies on at angle 0 [m]."""
+        return _frozen((self._com[..., None, :] + self._from_com(self.face))[..., 2].max(axis=-1))
+
+    @property
+    def _com(self) -> Array:
+        """(W, N+1, 3) the CoM from the table's origin, table axes."""
+        return (self.position - self.truth.origin) @ self.table_axes
+
+    def _from_com(self, points: Array) -> Array:
+        """(W, N+1, P, 3) points (P, 3) of the object, turned from object to table axes."""
+        q = self.quaternion[..., None, :]
+        pure = np.insert(points, 0, 0.0, axis=-1)
+        return quaternion_product(quaternion_product(q, pure), q * INVERSE)[..., 1:] @ self.table_axes
 
     @cached_property
     def slip(self) -> Array:
-        """(W, N+1) displacement of the material corner along the table since the start [m]."""
-        return _frozen(self.corner[..., 0] - self.corner[:, :1, 0])
+        """(W, N+1, K, 2) displacement of the material contact points along the table (t, o) since the start [m]."""
+        return _frozen(self.corner[..., :2] - self.corner[:, :1, :, :2])
 
     @cached_property
     def friction_use(self) -> Array:
-        """(W, N) measured |f_t| / (mu f_n) with the world's mu, at 1 the contact slides; nan without a push."""
-        tangential, normal = np.abs(self.force_measured[..., 0, 0]), self.force_measured[..., 0, 1]
+        """(W, N, K) measured |f_t| / (mu f_n) with the world's mu, at 1 a contact slides; nan without a push."""
+        tangential = np.linalg.norm(self.force_measured[..., :-1], axis=-1)
+        normal = self.force_measured[..., -1]
         pushed = normal > 0.0
         return _frozen(np.where(pushed, tangential, np.nan) / np.where(pushed, self.mu_world * normal, 1.0))
+
+    @cached_property
+    def landed(self) -> NDArray[np.bool_]:
+        """(W, N) whether there are all the contacts that the scenario is to end with."""
+        return self.contacts_found >= max(1, self.scenario.limits.contacts_end)
 
     @cached_property
     def measures(self) -> Measures:

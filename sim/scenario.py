@@ -7,11 +7,12 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pivoting.controller.laws import FORMULATIONS, Law
 from pivoting.controller.problem import wrench_weight
 from pivoting.controller.references import Constant, MinimumJerk, Reference, Sine
 from pivoting.controller.validate import Array, fail, number, one_of
-from pivoting.models.scenes import WORLD_KEYS, scene_path
+from pivoting.models.scenes import BODY, TABLE, WORLD_KEYS, scene_path
 from pivoting.sim.verdict import Limits
 
 HIDDEN_KEYS = ("mu", "mass", "size", "incline", "gravity")  # what the world may have and the controller not know
@@ -54,7 +55,13 @@ class Scenario:
 
     Attributes:
         name, summary: shown by `pivoting list`.
-        scene: name of an MJCF file in models/.
+        scene: name of an MJCF file in models/, or the path of one of your own.
+        body, support: names of the object and of the geom that it stands on (None: the only plane).
+        contact: what stays put: "corner" (planar scenes), "vertex", "edge", "lowest", or points (K, 3), body frame,
+            see `models.candidates.stance`.
+        chosen: whether the object's own contact and solver parameters give way to those of the shipped scenes.
+        about: "tilt" (theta lifts the object off its face) or "yaw" (with the CoM straight above the contact, theta
+            turns it about the table's normal).
         reference: "constant" (stay at theta for seconds), "arc" (theta to theta_end in seconds, at rest for hold before
             and after), "return" (an arc and back), "sine" (theta + amplitude sin, for seconds); from Python also any
             `Reference`, for seconds.
@@ -67,7 +74,12 @@ class Scenario:
 
     name: str
     summary: str
-    scene: str
+    scene: str | Path
+    body: str = BODY
+    support: str | None = TABLE
+    contact: str | ArrayLike = "corner"
+    chosen: bool = False
+    about: str = "tilt"
     reference: str | Reference = "constant"
     theta: float = 30.0
     theta_end: float = 80.0
@@ -102,8 +114,12 @@ class Scenario:
         one_of("law", self.law, FORMULATIONS)
         if not isinstance(self.limits, Limits):
             raise fail("limits", self.limits, "Limits")
+        one_of("about", self.about, ("tilt", "yaw"))
+        corner = isinstance(self.contact, str) and self.contact == "corner"
         for key in _RANGES:
-            if getattr(self, key) is not None or key not in _OPTIONAL:
+            if key in ("theta", "theta_end") and not corner:  # what an object allows, its plan knows
+                number(key, getattr(self, key), at_least=-360.0, at_most=360.0, unit="deg")
+            elif getattr(self, key) is not None or key not in _OPTIONAL:
                 number(key, getattr(self, key), **_RANGES[key])
         object.__setattr__(self, "world", MappingProxyType(dict(self.world)))
         for key, value in self.world.items():
@@ -111,13 +127,13 @@ class Scenario:
                 raise fail(f"world.{key}", value, "one of " + ", ".join(f"world.{k}" for k in HIDDEN_KEYS))
             number(f"world.{key}", value, **_RANGES[key])
         swing = self.amplitude if self.reference == "sine" else 0.0
-        if not LOWEST <= self.theta - swing <= self.theta + swing <= 90.0 - LOWEST:
+        if corner and not LOWEST <= self.theta - swing <= self.theta + swing <= 90.0 - LOWEST:
             raise fail("amplitude", swing, f"such that the block stays on its corner about theta = {self.theta:g} deg")
 
     @property
     def path(self) -> Path:
         """The MJCF file."""
-        return scene_path(self.scene)
+        return self.scene if isinstance(self.scene, Path) else scene_path(self.scene)
 
     @property
     def believed(self) -> dict[str, float]:
@@ -150,7 +166,8 @@ class Scenario:
     @property
     def changes(self) -> dict[str, Any]:
         """What differs from the shipped scenario of this name, by key; everything, if there is none."""
-        shipped = SCENARIOS.get(self.name)
+        own_one = isinstance(self.scene, Path) and self.name == "pivot"
+        shipped = own_object(self.scene, self.body) if own_one else SCENARIOS.get(self.name)  # type: ignore[arg-type]
         own = {
             key: getattr(self, key) for key in KEYS if shipped is None or getattr(self, key) != getattr(shipped, key)
         }
@@ -173,9 +190,9 @@ class Scenario:
             return Law.quasi_dynamic(1.0 / self.bandwidth)
         return Law.dynamic(self.bandwidth, self.damping)
 
-    def wrench_weight(self) -> Array | None:
+    def wrench_weight(self, dim: int) -> Array | None:
         """Q_w of the characteristic length, or None for the controller's own."""
-        return None if self.length is None else wrench_weight(2, self.length)
+        return None if self.length is None else wrench_weight(dim, self.length)
 
     def change(self, **overrides: Any) -> "Scenario":
         """This scenario with other values; `world.KEY` (or a mapping `world`) changes the world alone.
@@ -216,6 +233,34 @@ def _parsed(key: str, value: Any, prefix: str = "") -> Any:
     return value
 
 
+def own_object(
+    model: Path, body: str, contact: str | ArrayLike = "lowest", *, support: str | None = None, chosen: bool = True
+) -> Scenario:
+    """A scenario of an object of your own: turned by 20 degrees about a contact, in 2 s.
+
+    Args:
+        model: MJCF file.
+        body: name of a body that moves freely, or by two slides and a hinge.
+        contact: "vertex", "edge", "lowest", or points (K, 3) in the body frame [m]; see `models.candidates.stance`.
+        support: name of the plane or box geom that it stands on; None: the only plane.
+        chosen: simulate it with the contact and solver parameters of the shipped scenes (`models/settings.xml`).
+    """
+    return Scenario(
+        "pivot",
+        f"{body} of {model.name} about its {contact if isinstance(contact, str) else 'given contact'}",
+        scene=Path(model),
+        body=body,
+        support=support,
+        contact=contact,
+        chosen=chosen,
+        reference="arc",
+        theta=5.0,
+        theta_end=25.0,
+        seconds=2.0,
+        limits=Limits(slip_m=5e-4, angle_rms_deg=0.1, angle_max_deg=0.2, force_mismatch_rel=0.05, settle_s=0.1),
+    )
+
+
 def scenario(name: str) -> Scenario:
     """The shipped scenario of that name."""
     if name not in SCENARIOS:
@@ -223,6 +268,7 @@ def scenario(name: str) -> Scenario:
     return SCENARIOS[name]
 
 
+_SPATIAL = Limits(slip_m=1e-4, angle_rms_deg=0.05, angle_max_deg=0.1, force_mismatch_rel=0.03, settle_s=0.1)
 SCENARIOS = {
     case.name: case
     for case in (
@@ -261,6 +307,48 @@ SCENARIOS = {
             seconds=0.3,
             f_min=50.0,
             limits=Limits(slip_m=1e-4, angle_rms_deg=0.1, angle_max_deg=0.2, force_mismatch_rel=0.05, settle_s=0.1),
+        ),
+        Scenario(
+            "balance-3d",
+            "a 1 x 0.7 x 1.4 m block on one vertex, its body diagonal vertical, for 10 s",
+            scene="balance-3d",
+            contact="vertex",
+            about="yaw",
+            theta=0.0,
+            limits=_SPATIAL,
+        ),
+        Scenario(
+            "spin-3d",
+            "the block on that vertex, 90 deg of yaw in 2 s",
+            scene="spin-3d",
+            contact="vertex",
+            about="yaw",
+            reference="arc",
+            theta=0.0,
+            theta_end=90.0,
+            seconds=2.0,
+            limits=_SPATIAL,
+        ),
+        Scenario(
+            "pivot-3d",
+            "the block about an edge, two contacts, from 10 to 80 deg in 2 s",
+            scene="pivot-3d",
+            contact="edge",
+            reference="arc",
+            theta=10.0,
+            seconds=2.0,
+            limits=_SPATIAL,
+        ),
+        Scenario(
+            "settle-3d",
+            "the block lowered about an edge until it lies on its face, without bouncing, in 2 s",
+            scene="settle-3d",
+            contact="edge",
+            reference="arc",
+            theta=20.0,
+            theta_end=0.0,
+            seconds=2.0,
+            limits=replace(_SPATIAL, contacts_end=4),
         ),
     )
 }

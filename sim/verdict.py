@@ -19,7 +19,9 @@ class Limits:
     Attributes:
         slip_m: displacement of the material corner along the table [m].
         angle_rms_deg, angle_max_deg: error of theta.
-        contact_lost_s: time in which MuJoCo's contact sensor shows no push.
+        contact_lost_s: time in which MuJoCo's contact sensor shows no push on one of the contacts.
+        contacts_end: contacts with the support that there have to be at the end; 0: not asked.
+        bounce_m: height that the landed face may regain, where that is asked [m].
         force_mismatch_rel: RMS of (measured - predicted contact force) over RMS of the predicted.
         friction_use: |f_t| / (mu f_n), measured, with the world's mu; at 1 the contact slides.
         settle_s: what the start may take [s].
@@ -29,6 +31,8 @@ class Limits:
     angle_rms_deg: float = 0.1
     angle_max_deg: float = 0.2
     contact_lost_s: float = 0.0
+    contacts_end: int = 0
+    bounce_m: float = 1e-5
     force_mismatch_rel: float = 0.05
     friction_use: float = 0.999
     settle_s: float = 0.1
@@ -69,6 +73,11 @@ def judge(measures: "Measures", limits: Limits) -> tuple[Check, ...]:
         "force_mismatch_rel": (measures.force_mismatch_rel, limits.force_mismatch_rel),
         "unsolved_steps": (measures.unsolved_steps, 0.0),
     }
+    if limits.contacts_end:
+        pairs |= {
+            "contacts_missing": (measures.contacts_missing, 0.0),
+            "bounce_m": (measures.bounce_m, limits.bounce_m),
+        }
     return tuple(Check(name, float(np.max(value)), limit, ~(value <= limit)) for name, (value, limit) in pairs.items())
 
 

@@ -120,18 +120,24 @@ def solve_all(many: Data) -> Answers:
     """All problems through the compiled entry, in one compiled loop."""
     N, nw, n = many.jacobian.shape
     K = many.mu.shape[1]
-    out = Answers(np.empty((N, n)), np.empty((N, nw)), np.empty(N), np.empty((N, K), dtype=np.int64))
-    _loop(*many, *out, *workspace(nw, K, n // K))
-    return out
+    force, wrench, residual = np.empty((N, n)), np.empty((N, nw)), np.empty(N)
+    _loop(*many, force, wrench, residual, *workspace(nw, K, n // K))
+    return Answers(force, wrench, residual, _pieces(many, force.reshape(N, K, -1)))
+
+
+def _pieces(many: Data, force: np.ndarray) -> np.ndarray:
+    """(N, K) the piece of its cone that each force (N, K, d) is on, as an index of PIECES."""
+    normal, size = force[..., -1], np.linalg.norm(force[..., :-1], axis=-1)
+    edge = size >= many.mu * normal * (1.0 - 1e-9)
+    floor = (many.f_min > 0.0) & (normal <= many.f_min * (1.0 + 1e-9))
+    names = np.select([~normal.astype(bool), edge & floor, floor, edge], ["apex", "rim", "floor", "edge"], "inside")
+    return np.array([[PIECES.index(name) for name in row] for row in names])
 
 
 @njit
-def _loop(J, b, Q_w, Q_f, mu, f_min, f, w, residual, piece, reduced, scratch):  # type: ignore[no-untyped-def]
-    K = mu.shape[1]
+def _loop(J, b, Q_w, Q_f, mu, f_min, f, w, residual, reduced, scratch):  # type: ignore[no-untyped-def]
     for i in range(J.shape[0]):
         residual[i] = smallest_wrench(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], f[i], w[i], reduced, scratch)
-        if scratch is not None:
-            piece[i] = views(scratch, w.shape[1], K, f.shape[1] // K).piece
 
 
 def closed_form_residuals(many: Data) -> np.ndarray:

@@ -168,7 +168,8 @@ HINGE = '<joint type="hinge" axis="0 1 0"/>'
     [
         (model_with(SLIDES + HINGE), {"body": "nope"}, "body = 'nope': must be one of b"),
         (model_with(""), {}, "body = 'b': it has no joint, so no free motion"),
-        (model_with("<freejoint/>"), {}, "body = 'b': its joints are free"),
+        (model_with("<freejoint/>"), {}, "contact = .*3 body-frame coordinates"),
+        (model_with('<joint type="ball"/>'), {}, "body = 'b': its joints are ball; needs a free joint, or"),
         (model_with(HINGE), {}, "body = 'b': its joints are hinge"),
         (model_with(SLIDES + '<joint type="hinge" axis="1 0 0"/>'), {}, "joint axes are not perpendicular"),
         (model_with(SLIDES + HINGE, child='<body><geom size=".01"/></body>'), {}, "other bodies hang on it"),

@@ -68,7 +68,7 @@ def test_plots_hold_the_arrays_of_the_run(run: Run, entities: dict[str, Columns]
     wanted = {
         "angle/theta": np.rad2deg(run.theta[1]),
         "angle/reference": np.rad2deg(run.reference[0]),
-        "slip/measured": 1e3 * run.slip[1],
+        "slip/measured": 1e3 * run.slip[1, :, 0, 0],
         "wrench/F_u": run.wrench[1, :, 0],
         "wrench/F_v": run.wrench[1, :, 1],
         "wrench/M": run.wrench[1, :, 2],
@@ -91,10 +91,10 @@ def test_plots_hold_the_arrays_of_the_run(run: Run, entities: dict[str, Columns]
 
 def test_what_is_not_a_number_is_a_gap(run: Run, entities: dict[str, Columns]) -> None:
     rows = entities["/plots/friction_use/measured"]["Scalars:scalars"].to_pylist()
-    lost = np.isnan(run.friction_use[1])
+    lost = np.isnan(run.friction_use[1, :, 0])
     assert 0 < lost.sum() < lost.size
     assert [len(row) for row in rows] == (~lost).astype(int).tolist()
-    assert np.array_equal([row[0] for row in rows if row], run.friction_use[1, ~lost])
+    assert np.array_equal([row[0] for row in rows if row], run.friction_use[1, ~lost, 0])
     assert set(one_each(entities["/plots/friction_use/limit"]["Scalars:scalars"])) == {1.0}
 
 
@@ -107,7 +107,7 @@ def test_block_is_posed_as_the_run_says(run: Run, entities: dict[str, Columns]) 
     assert np.array_equal(turn, run.quaternion[1, k][:, [1, 2, 3, 0]].astype(np.float32))
     (half,) = entities["/world/block/solid"]["static Boxes3D:half_sizes"].to_pylist()[0]
     corner = at + Rotation.from_quat(turn).apply([-half[0], 0.0, -half[2]])
-    assert np.allclose(corner[:, [0, 2]], run.corner[1, k], atol=1e-6)
+    assert np.allclose(corner[:, [0, 2]], run.corner[1, k, 0][:, [0, 2]], atol=1e-6)
     assert half[0] == half[2] == 0.5
 
 
@@ -135,7 +135,7 @@ def test_arrows_of_a_body_at_rest_add_up_to_nothing(name: str, shipped: Callable
 
 def at_corner(run: Run) -> np.ndarray:
     """(N+1, 3) the material corner, world axes."""
-    return run.truth.origin + run.corner[0] @ matrix(run.truth.table)[:, [0, 2]].T
+    return run.truth.origin + run.corner[0, :, 0] @ matrix(run.truth.table).T
 
 
 def test_cones_are_the_planned_and_the_worlds(shipped: Callable[[str], Run], tmp_path: Path) -> None:
@@ -175,7 +175,7 @@ def test_wrench_space_is_solved_again_with_the_same_answer(run: Run, entities: d
     w, Jf, required = (
         one_each(entities[f"/wrench_space/{part}"]["Arrows3D:vectors"]) for part in ("wrench", "contact", "required")
     )
-    lever = np.linalg.norm(run.corner_point)
+    lever = np.linalg.norm(run.points[0])
     assert np.allclose(w, run.wrench[1, k] / [1.0, 1.0, lever], rtol=1e-5, atol=1e-5)
     assert np.allclose(w + Jf, required, rtol=1e-5, atol=1e-4)
     cone = np.array(entities["/wrench_space/cone/fill"]["Mesh3D:vertex_positions"].to_pylist())
@@ -222,10 +222,11 @@ def test_layout_shows_everything(rrd: Path, entities: dict[str, Columns]) -> Non
     (blueprint,) = reader.blueprints()
     batches = [chunk.to_record_batch() for chunk in reader.stream(store=blueprint)]
     shown = str([batch.column(name).to_pylist() for batch in batches for name in batch.schema.names if ":" in name])
-    for origin in ("world", "wrench_space", "report", *(f"plots/{name}" for name in recording.TITLES)):
+    drawn = {"angle", "slip", "friction_use", "force", "wrench", "solve_us"}
+    for origin in ("world", "wrench_space", "report", *(f"plots/{name}" for name in drawn)):
         assert f"/{origin}'" in shown or f"'{origin}'" in shown, origin
     plots = {entity.split("/")[2] for entity in entities if entity.startswith("/plots/")}
-    assert plots == set(recording.TITLES)
+    assert plots == drawn
     rooms = {entity.split("/")[1] for entity in entities}
     assert rooms == {"world", "wrench_space", "plots", "report"}  # and no properties
 
@@ -310,6 +311,71 @@ def test_a_world_that_is_nowhere_from_the_start(run: Run, tmp_path: Path) -> Non
     lost = replace(run, position=np.full_like(run.position, np.nan))
     ((text,),) = read(record(lost, tmp_path / "lost.rrd"))["/report"]["static TextDocument:text"].to_pylist()
     assert "diverged at 0 s" in text
+
+
+SPATIAL = {"pivot-3d": {}, "balance-3d": {"seconds": 1.0, "f_min": 2.0}, "settle-3d": {}}
+
+
+@pytest.mark.parametrize("name", list(SPATIAL))
+def test_in_space(name: str, tmp_path: Path) -> None:
+    """Body, arrows, cones and plots of a run with one or two contacts are the run's arrays."""
+    run = simulate(name, **SPATIAL[name])
+    path = record(run, tmp_path / "space.rrd")
+    assert rerun_rrd("verify", path) == 0
+    entities = read(path)
+    block, k = entities["/world/block"], steps(entities["/world/block"])
+    at, turn = one_each(block["Transform3D:translation"]), one_each(block["Transform3D:quaternion"])
+    assert np.array_equal(at, run.position[0, k].astype(np.float32))
+    assert np.array_equal(turn, run.quaternion[0, k][:, [1, 2, 3, 0]].astype(np.float32))
+    solid = entities["/world/block/solid"]
+    vertices = np.unique(solid["static Mesh3D:vertex_positions"].to_pylist()[0], axis=0)
+    assert np.allclose(np.abs(vertices), [0.5, 0.35, 0.7])
+    assert vertices.shape == (8, 3)
+    assert len(entities["/world/block/edges"]["static LineStrips3D:strips"].to_pylist()[0]) == 12
+    force = one_each(entities["/world/wrench/force"]["Arrows3D:vectors"])
+    (weight,) = entities["/world/wrench/weight"]["static Arrows3D:vectors"].to_pylist()[0]
+    scale = np.linalg.norm(weight) / (run.truth.mass * np.linalg.norm(run.truth.gravity))
+    k = steps(entities["/world/wrench/force"])
+    moment = one_each(entities["/world/wrench/moment"]["Arrows3D:vectors"])
+    lever = np.linalg.norm(run.points.mean(axis=0))
+    assert np.allclose(force, scale * run.wrench_world[0, k, :3], atol=1e-5)
+    assert np.allclose(moment, scale / lever * run.wrench_world[0, k, 3:], atol=1e-5)
+    centre = one_each(entities["/world/wrench"]["Transform3D:translation"])
+    assert np.array_equal(centre, run.position[0, k].astype(np.float32))
+    tags = [""] if len(run.points) == 1 else ["0", "1"]
+    paths = entities["/world/path/corner"]["static LineStrips3D:strips"].to_pylist()[0]
+    for i, tag in enumerate(tags):
+        entity, tail = f"/world/contact/{tag}".rstrip("/"), f"_{tag}".rstrip("_")
+        pose = entities[entity]
+        point = run.position[0] + Rotation.from_quat(run.quaternion[0][:, [1, 2, 3, 0]]).apply(run.points[i])
+        assert np.allclose(one_each(pose["Transform3D:translation"]), point[k], atol=1e-6)
+        assert np.allclose(paths[i][-1], point[-1], atol=1e-6)
+        frame = Rotation.from_quat(one_each(pose["Transform3D:quaternion"]))
+        assert np.allclose(frame.as_matrix(), matrix(run.truth.table), atol=1e-6)
+        for which, forces in (("predicted", run.force), ("measured", run.force_measured)):
+            arrows = one_each(entities[f"{entity}/{which}"]["Arrows3D:vectors"])
+            assert np.allclose(arrows, scale * forces[0, k, i], atol=1e-5)
+            plotted = [one_each(entities[f"/plots/{part}/{which}{tail}"]["Scalars:scalars"]) for part in ("f_n", "f_t")]
+            assert np.array_equal(plotted[0], forces[0, :, i, 2])
+            assert np.allclose(plotted[1], np.hypot(*forces[0, :, i, :2].T), rtol=1e-12)
+        floor = scale * run.scenario.f_min
+        for which, mu, low in (("planned", run.attached.controller.belief.mu[i], floor), ("world", run.mu_world, 0.0)):
+            lines = entities[f"{entity}/cone/{which}"]["static LineStrips3D:strips"].to_pylist()[0]
+            (left, apex, right), (bottom, top) = np.array(lines[0]), map(np.array, lines[-2:])
+            assert apex.tolist() == [0.0, 0.0, 0.0]
+            assert np.allclose([left[0], right[0]], [-mu * left[2], mu * left[2]])
+            assert np.allclose(np.hypot(bottom[:, 0], bottom[:, 1]), mu * low, atol=1e-6)
+            assert np.allclose(bottom[:, 2], low, atol=1e-6)
+            assert np.allclose(np.hypot(top[:, 0], top[:, 1]), mu * top[:, 2])
+        slip = one_each(entities[f"/plots/slip/measured{tail}"]["Scalars:scalars"])
+        assert np.allclose(slip, 1e3 * np.linalg.norm(run.slip[0, :, i], axis=1), rtol=1e-12)
+    wrench = [one_each(entities[f"/plots/wrench/{part}_{axis}"]["Scalars:scalars"]) for part in "FM" for axis in "xyz"]
+    assert np.array_equal(np.transpose(wrench), run.wrench[0])
+    error = one_each(entities["/plots/error/orientation"]["Scalars:scalars"])
+    assert np.array_equal(error, np.rad2deg(run.angle_error[0]))
+    assert {entity.split("/")[1] for entity in entities} == {"world", "plots", "report"}
+    plots = {entity.split("/")[2] for entity in entities if entity.startswith("/plots/")}
+    assert plots == {"angle", "slip", "friction_use", "f_n", "f_t", "wrench", "solve_us", "error"}
 
 
 def test_importing_does_not_load_rerun() -> None:

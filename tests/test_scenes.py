@@ -5,20 +5,32 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from pivoting.controller.space import space
 from pivoting.models import ModelError, corner, load, place, read_body, scene_path
 from pivoting.sim import SCENARIOS
+from pivoting.sim.plan import planned
 
 
-@pytest.mark.parametrize("name", sorted({case.scene for case in SCENARIOS.values()}))
-def test_each_opens_on_its_own_standing_on_its_corner(name: str) -> None:
-    """As a stranger would open it in the viewer: the start keyframe has the corner on the table."""
-    model = mujoco.MjModel.from_xml_path(str(scene_path(name)))
+@pytest.mark.parametrize("name", sorted(SCENARIOS))
+def test_each_opens_on_its_own_standing_on_its_contact(name: str) -> None:
+    """As a stranger would open it in the viewer: the start keyframe has the contact points on the table."""
+    case = SCENARIOS[name]
+    model = mujoco.MjModel.from_xml_path(str(case.path))
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.keyframe("start").id)
     mujoco.mj_kinematics(model, data)
-    R = data.xmat[1].reshape(3, 3)
-    np.testing.assert_allclose(data.xpos[1] + R @ corner(model), 0.0, atol=1e-8)
+    plan = planned(case, model)
+    normal = data.geom("table").xmat.reshape(3, 3)[:, 2]
+    heights = (data.xpos[1] + plan.contacts @ data.xmat[1].reshape(3, 3).T) @ normal
+    np.testing.assert_allclose(heights, 0.0, atol=1e-8)
+    others = data.xpos[1] + _corners(model) @ data.xmat[1].reshape(3, 3).T
+    assert np.count_nonzero(others @ normal > 1e-3) == 8 - (2 if model.nq == 3 else len(plan.contacts))
     np.testing.assert_allclose(model.geom_solref[:, 0], 2.1 * model.opt.timestep)
+
+
+def _corners(model: mujoco.MjModel) -> np.ndarray:
+    """(8, 3) of the block."""
+    return np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T * model.geom("block").size
 
 
 def test_the_notes_numbers_are_in_the_scene() -> None:
@@ -51,7 +63,7 @@ def test_changes_arrive_in_the_compiled_model() -> None:
 def test_place_puts_the_corner_there(theta: float) -> None:
     model = load(scene_path("incline-2d")).compile()
     data, body = mujoco.MjData(model), read_body(model, "block", "table")
-    place(model, data, body, theta, corner(model), [0.1, 0.0, 0.3])
+    place(model, data, body, space(2, body.table).orientation(theta), corner(model), [0.1, 0.0, 0.3])
     mujoco.mj_kinematics(model, data)
     R = data.xmat[1].reshape(3, 3)
     np.testing.assert_allclose(data.xpos[1] + R @ corner(model), [0.1, 0.0, 0.3], atol=1e-12)

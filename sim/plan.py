@@ -1,0 +1,102 @@
+"""Where a scenario's object stands and about what it turns: contacts, axis, and the orientation at angle 0."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pivoting.controller.space import quaternion_product
+from pivoting.models.candidates import contact_points, stance, support_points
+from pivoting.models.reading import ModelError, RigidBody, matrix, quaternion, read_body
+from pivoting.sim.scenario import LOWEST, Scenario
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A scenario on a model.
+
+    Attributes:
+        body: as the model has it.
+        contacts: (K, 3) the points that are to stick, body frame [m].
+        at: (3,) where the first of them stands, world axes [m].
+        axis: (3,) unit vector that the object turns about, through the contacts, world axes.
+        start: (4,) orientation at angle 0, object axes to world.
+        range: the angles [rad] at which nothing else touches the support.
+        face: (P, 3) the corners that touch as well at angle 0, body frame [m].
+    """
+
+    body: RigidBody
+    contacts: Array
+    at: Array
+    axis: Array
+    start: Array
+    range: tuple[float, float]
+    face: Array
+
+
+def planned(case: Scenario, model: mujoco.MjModel) -> Plan:
+    """The scenario's plan on its compiled model.
+
+    Raises:
+        ModelError: the model cannot be served, or the object cannot be pivoted on that contact; with the reason.
+    """
+    body = read_body(model, case.body, case.support)
+    table = matrix(body.table)
+    gap = np.deg2rad(LOWEST)
+    if body.dim == 2:
+        return _planar(case, model, body)
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_kinematics(model, data)
+    now = data.xmat[body.index].reshape(3, 3)
+    if not isinstance(case.contact, str):
+        _refuse_above(model, body, case.contact, table.T @ now)
+    found = stance(model, body.index, case.contact, quaternion(now), body.table)
+    start, axis = table @ found.rotation, table @ found.axis
+    low, high = found.range
+    lands = case.limits.contacts_end > 0
+    limits = (low if lands else low + gap, high - gap)
+    if case.about == "yaw":
+        turned = np.concatenate([[np.cos(0.5 * found.balance)], np.sin(0.5 * found.balance) * axis])
+        start, axis = matrix(quaternion_product(turned, quaternion(start))), table[:, 2]
+        limits = (-2.0 * np.pi, 2.0 * np.pi)
+    # the object starts where its file has it: the first contact is put under the place that it has there
+    there = data.xpos[body.index] + now @ found.points[0] - body.origin
+    at = body.origin + there - (there @ table[:, 2]) * table[:, 2]
+    face = support_points(model, body.index, -found.rotation[2])
+    return Plan(body, found.points, at, axis, quaternion(start), limits, face)
+
+
+def _planar(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
+    """In the plane the contact is the left end of the face that is down at theta = 0, unless it is given."""
+    axes, table, gap = matrix(body.axes), matrix(body.table), np.deg2rad(LOWEST)
+    if isinstance(case.contact, str):
+        face = support_points(model, body.index, -axes[:, 2])
+        along = face @ axes[:, 0]
+        point = face[along < along.min() + 1e-6 * np.ptp(along)].mean(axis=0)
+    else:
+        point = np.reshape(np.asarray(case.contact, dtype=float), -1)
+        if point.shape != (3,):
+            raise ModelError(f"contact = {point.tolist()}: in the plane must be one point (x, y, z), body frame [m]")
+    others = (contact_points(model, body.index) - point) @ axes[:, [0, 2]]
+    apart = others[np.linalg.norm(others, axis=1) > 1e-6 * np.abs(others).max(initial=0.0)]
+    if not len(apart) or apart[:, 1].min() < -1e-6 * np.abs(apart).max():
+        raise ModelError(f"contact = {point.tolist()}: must be a lowest corner of the body at theta = 0 [m]")
+    most = np.pi - np.arctan2(np.maximum(apart[:, 1], 0.0), apart[:, 0]).max()  # when the next corner comes down
+    return Plan(body, point[None], body.origin, -table[:, 1], body.table, (gap, most - gap), point[None])
+
+
+def _refuse_above(model: mujoco.MjModel, body: RigidBody, contact: ArrayLike, now: Array) -> None:
+    """Points that are given have to be the lowest of the body as its file has it, body to table axes `now` (3, 3)."""
+    points = np.atleast_2d(np.asarray(contact, dtype=float))
+    if points.shape[-1] != 3:
+        return  # `stance` says what is wrong
+    height = ((points - support_points(model, body.index, -now[2])[0]) @ now[2]).max()
+    if height > 1e-3 * np.linalg.norm(points - body.com, axis=-1).max():
+        raise ModelError(
+            f"contact = {points.tolist()}: as the file has the body, this is {height:.3g} m above the table that its "
+            'lowest point could stand on; must be among its lowest, or "vertex", "edge", "lowest"'
+        )

@@ -1,0 +1,114 @@
+"""Shapes as triangles and lines, to be drawn: a body's geoms, a friction cone, an arc with a head."""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from pivoting.models.reading import RigidBody, matrix
+from scipy.spatial import ConvexHull
+
+Array = NDArray[np.float64]
+SIDES = 32  # of what is round
+SHARP = np.cos(np.deg2rad(30.0))  # edges whose faces turn by more are drawn
+BOX = np.stack(np.meshgrid(*3 * [[-1.0, 1.0]], indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+class Solid(NamedTuple):
+    """A surface.
+
+    Attributes:
+        vertices: (3 M, 3) [m]; each three of them make a triangle, counter-clockwise seen from outside.
+        normals: (3 M, 3) outward, of these triangles.
+        lines: (L, 2, 3) ends of its sharp edges [m].
+    """
+
+    vertices: Array
+    normals: Array
+    lines: Array
+
+
+def body_solids(model: mujoco.MjModel, body: RigidBody) -> list[Solid]:
+    """The colliding geoms of a body in object axes, as convex as MuJoCo takes them."""
+    paired = {*model.pair_geom1.tolist(), *model.pair_geom2.tolist()}
+    first = int(model.body_geomadr[body.index])
+    geoms = [
+        geom
+        for geom in range(first, first + int(model.body_geomnum[body.index]))
+        if model.geom_contype[geom] or model.geom_conaffinity[geom] or geom in paired
+    ]
+    points = [_points(model, geom) @ matrix(model.geom_quat[geom]).T + model.geom_pos[geom] for geom in geoms]
+    return [_hull((each - body.com) @ matrix(body.axes)) for each in points]
+
+
+def _points(model: mujoco.MjModel, geom: int) -> Array:
+    """(P, 3) points whose convex hull is the geom, in its own frame; what is round has them on its surface."""
+    size = np.array(model.geom_size[geom])
+    kind = mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
+    if kind == "mesh":
+        mesh = int(model.geom_dataid[geom])
+        first = int(model.mesh_vertadr[mesh])
+        return np.array(model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])], dtype=float)
+    along = np.linspace(0.0, np.pi, SIDES // 2 + 1)[:, None, None]
+    around = circle(SIDES)
+    ball = (np.sin(along) * around + np.cos(along) * [0.0, 0.0, 1.0]).reshape(-1, 3)
+    ends = size[1] * np.array([[[0.0, 0.0, -1.0]], [[0.0, 0.0, 1.0]]])
+    shapes = {
+        "box": size * BOX,
+        "ellipsoid": size * ball,
+        "sphere": size[0] * ball,
+        "capsule": size[0] * ball + ends,
+        "cylinder": size[0] * around + ends,
+    }
+    return shapes[kind].reshape(-1, 3)
+
+
+def _hull(points: Array) -> Solid:
+    """The convex hull of (P, 3) points."""
+    hull = ConvexHull(points)
+    corners, normals = hull.points[hull.simplices], hull.equations[:, :3]
+    outward = np.linalg.det(corners - hull.points.mean(axis=0)) > 0.0
+    corners = np.where(outward[:, None, None], corners, corners[:, ::-1])
+    pairs = [(i, j) for i, row in enumerate(hull.neighbors) for j in row if i < j]
+    sharp = [np.intersect1d(*hull.simplices[[i, j]]) for i, j in pairs if normals[i] @ normals[j] < SHARP]
+    lines = hull.points[np.array(sharp, dtype=int).reshape(-1, 2)]
+    return Solid(corners.reshape(-1, 3), np.repeat(normals, 3, axis=0), lines)
+
+
+def circle(sides: int) -> Array:
+    """(sides, 3) unit vectors around z, from -x; two sides are the directions of the plane."""
+    turn = 2.0 * np.pi * np.arange(sides) / sides
+    return np.stack([-np.cos(turn), -np.sin(turn), 0.0 * turn], axis=1).round(15)
+
+
+def cone(mu: float, low: float, high: float, dim: int) -> tuple[Array, NDArray[np.int64], list[Array]]:
+    """A friction cone about z with its apex at the origin, in the plane (x, z) a wedge; `low` and `high` in z [m].
+
+    Returns:
+        Vertices (V, 3) of the cone from `low` to `high`, triangles (M, 3) of it, and lines (P, 3) from the apex to
+        `high` and around `low`; in space around `high` as well.
+    """
+    sides = 2 if dim == 2 else SIDES
+    edges = mu * circle(sides) + [0.0, 0.0, 1.0]
+    i = np.arange(sides if dim == 3 else 1)
+    j = (i + 1) % sides
+    triangles = np.concatenate([np.stack([i, j, sides + i], axis=1), np.stack([j, sides + j, sides + i], axis=1)])
+    half = sides // 2
+    beams = [np.array([high * edges[k], np.zeros(3), high * edges[k + half]]) for k in range(0, half, 4)]
+    rims = [height * np.vstack([edges, edges[:1]]) for height in (low, high)[: dim - 1]]
+    return np.vstack([low * edges, high * edges]), triangles, beams + rims
+
+
+def arcs(sweep: Array, radius: float) -> Array:
+    """(R, 28, 2) arcs about the origin from 45 deg on, with an arrow head, counter-clockwise for a positive sweep.
+
+    Args:
+        sweep: (R,) [rad].
+        radius: [m].
+    """
+    turn = sweep[:, None]
+    shaft = 0.25 * np.pi + turn * np.linspace(0.0, 1.0, 25)
+    tip = shaft[:, -1:]
+    barb = tip - np.sign(turn) * np.minimum(0.35, np.abs(turn))
+    angle, away = np.hstack([shaft, barb, tip, barb]), radius * np.array([1.0] * 25 + [1.25, 1.0, 0.75])
+    return np.stack([away * np.cos(angle), away * np.sin(angle)], axis=-1)
