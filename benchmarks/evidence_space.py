@@ -10,12 +10,11 @@ from pivoting.controller import SolveError, pyramid_excess, solve
 from rich.progress import track
 
 sys.path.insert(0, str(Path(__file__).parent.parent))  # the same random problems as the tests
-from tests.draws import draw, solve_all, stack, stated, trivial_cost
+from tests.draws import draw, solve_all, stack, stated, trivial_cost, whitened_objective
 
 SIZES = [(1, 3), (2, 3), (4, 3), (2, 2), (4, 2)]  # (contacts, dim)
 EDGES = (4, 8, 16, 32, 64)
 CERTIFIED = 1e-8  # of Clarabel, for its objective to count as a second opinion
-CONVERGED = 1e-12  # likewise, as a tight one: its objective is no closer to the optimum than its residual lets it
 
 
 def problems(K: int, dim: int, count: int) -> dict[str, float]:
@@ -31,6 +30,12 @@ def problems(K: int, dim: int, count: int) -> dict[str, float]:
         rounds.append(perf_counter() - start)
     gap = dearer = relative = close = 0.0
     refused = failed = converged = 0
+    for i, data in enumerate(track(drawn if dim == 3 else [], f"{K} contacts, dim {dim}: whitened", transient=True)):
+        problem = stated(data)
+        mine, other = problem.objective(answers.wrench[i], answers.force[i]), whitened_objective(problem)
+        if np.isfinite(other):
+            converged += 1
+            close = max(close, abs(mine - other) / max(mine, other))
     for i, data in enumerate(track(drawn, f"{K} contacts, dim {dim}: Clarabel", transient=True)):
         problem = stated(data)
         try:
@@ -42,22 +47,22 @@ def problems(K: int, dim: int, count: int) -> dict[str, float]:
         mine, other = problem.objective(answers.wrench[i], answers.force[i]), answer.objective
         gap = max(gap, abs(mine - other) / trivial_cost(problem))
         relative = max(relative, abs(mine - other) / max(mine, other))
-        if answer.residual <= CONVERGED:
-            converged += 1
-            close = max(close, abs(mine - other) / max(mine, other))
         dearer = max(dearer, (mine - other) / max(mine, other))
     name = f"{K} contacts, {'space' if dim == 3 else 'plane'}: "
+    whitened = {
+        name + "whitened Clarabel converged to 1e-12": float(converged),
+        name + "greatest objective difference from whitened Clarabel / optimum": close,
+    }
     return {
         name + "problems": float(count),
         name + "greatest KKT residual": float(np.nan_to_num(answers.residual, nan=np.inf).max()),
         name + "greatest objective difference from Clarabel / trivial cost": gap,
         name + "greatest objective difference from Clarabel / optimum": relative,
         name + "greatest relative cost above Clarabel": dearer,
-        name + f"Clarabel converged to {CONVERGED:g}": float(converged),
-        name + "greatest objective difference from Clarabel where converged / optimum": close,
         name + f"Clarabel not certified to {CERTIFIED:g}": float(refused),
         name + "Clarabel not certified to 1e-05": float(failed),
         name + "us per solve, compiled": 1e6 * min(rounds) / count,
+        **(whitened if dim == 3 else {}),
     }
 
 
@@ -94,5 +99,5 @@ if __name__ == "__main__":
         bounds[name + "greatest KKT residual"] = 1e-10
         bounds[name + "greatest relative cost above Clarabel"] = 1e-7
         if dim == 3:
-            bounds[name + "greatest objective difference from Clarabel where converged / optimum"] = 1e-7
+            bounds[name + "greatest objective difference from whitened Clarabel / optimum"] = 1e-7
     main(__doc__ or "", measure, bounds)

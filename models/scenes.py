@@ -45,6 +45,8 @@ def load(
     Raises:
         ModelError: the file is not MJCF, or has nothing that a key could change.
     """
+    if not path.is_file():  # MuJoCo would print a warning of its own
+        raise ModelError(f"model = {str(path)!r}: not a readable MJCF file (there is no such file)")
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except ValueError as error:
@@ -67,6 +69,8 @@ def load(
     for key in ("mass", "size"):
         if key in wanted and len(geoms) != 1:
             raise ModelError(f"{key} = {wanted[key]:g}: the body has {len(geoms)} geoms; change them in its file")
+    if "size" in wanted and geoms[0].type != mujoco.mjtGeom.mjGEOM_BOX:
+        raise ModelError(f"size = {wanted['size']:g}: the body is not a box; change it in its file")
     if "size" in wanted:
         geoms[0].size = np.asarray(geoms[0].size) * 0.5 * wanted["size"] / np.max(geoms[0].size)
     if "mass" in wanted:

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.solvers import Solution, solve
 from pivoting.controller.space import Motion
-from pivoting.models.scenes import compiled, load
 from pivoting.sim.run import Run
 from pivoting.sim.solids import Solid, body_solids
 
@@ -91,11 +90,10 @@ class Film:
         """Of the contacts, to be put after a name: nothing if there is only one."""
         return [""] if len(self.run.points) == 1 else [str(i) for i in range(len(self.run.points))]
 
-    @cached_property
+    @property
     def model(self) -> mujoco.MjModel:
         """The world's, which may differ from what the controller believes."""
-        case = self.run.scenario
-        return compiled(load(case.path, case.actual, body=case.body, support=case.support))
+        return self.run.model
 
     @cached_property
     def solids(self) -> list[Solid]:

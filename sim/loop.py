@@ -94,6 +94,7 @@ def simulate(
         scenario=case,
         seed=int(seed),
         attached=attached,
+        model=model,
         truth=truth,
         points=np.array([space(d).lift(truth.point(contact)) for contact in plan.contacts]),
         face=np.array([space(d).lift(truth.point(corner)) for corner in plan.face]),

@@ -180,7 +180,7 @@ def _contacts(film: Film) -> None:
         measured, predicted = (film.scale * lift(f[film.world, rows, i]) for f in (run.force_measured, run.force))
         film.arrows(f"{entity}/measured", rows, measured, RED, 2.0 * thick, "")
         film.arrows(f"{entity}/predicted", rows, predicted, ORANGE, thick, f"f {tag}".strip(), at=1.0 if plane else 1.2)
-        film.still(f"{entity}/predicted", rr.Arrows3D.from_fields(origins=[[0.0, -2.7 * thick, 0.0]]))
+        film.still(f"{entity}/predicted", rr.Arrows3D.from_fields(origins=[[0.0, -8.0 / 3.0 * thick, 0.0]]))
         floor, mu_planned = film.scale * contact.f_min, float(film.planned_mu[i])
         aside = 0.35 if plane else 0.2
         for name, mu, colour, at in (("world", run.mu_world, GREY, -aside), ("planned", mu_planned, PURPLE, aside)):

@@ -61,6 +61,8 @@ def print_scenarios(console: Console) -> None:
     width = max(len(name) for name in SCENARIOS)
     for name, case in SCENARIOS.items():
         console.print(f"{name:{width}}  {case.summary}", highlight=False, soft_wrap=True)
+    own = "an object of your own, by 20 deg: --model FILE.xml --body NAME --contact vertex"
+    console.print(f"{'pivot':{width}}  {own}", highlight=False, soft_wrap=True)
 
 
 def print_examples(console: Console, results: list[tuple[list[Digit], Solution]]) -> None:

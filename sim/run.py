@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.space import Space, quaternion_product, space
@@ -32,7 +33,7 @@ class Run:
         scenario: what was run, overrides included.
         seed: of the worlds' initial errors.
         attached: the controller and what it believes.
-        truth: the body as the world has it.
+        model: the world's, with the sensors of the loop.  truth: the body as that has it.
         points: (K, 3) the world's contact points from the CoM, object axes [m].
         face: (P, 3) likewise, the corners of the face that the object lies on at angle 0.
         turn: the axis (3,) [world axes] and the orientation (4,) at angle 0 that `theta` is counted from.
@@ -59,6 +60,7 @@ class Run:
     scenario: Scenario
     seed: int
     attached: Attached
+    model: mujoco.MjModel
     truth: RigidBody
     points: Array
     face: Array
@@ -194,6 +196,9 @@ class Run:
         worst = {key: float(np.max(value)) for key, value in vars(self.measures).items()}
         return {
             "scenario": self.scenario.name,
+            "model": str(self.scenario.path),
+            "body": self.scenario.body,
+            "contacts": self.points.tolist(),
             "changes": self.scenario.changes,
             "limits": asdict(self.scenario.limits),
             "controller": self.controller,

@@ -264,7 +264,7 @@ def own_object(
 def scenario(name: str) -> Scenario:
     """The shipped scenario of that name."""
     if name not in SCENARIOS:
-        raise fail("scenario", name, "one of " + ", ".join(SCENARIOS))
+        raise fail("scenario", name, "one of " + ", ".join(SCENARIOS) + ", or pivot with a model")
     return SCENARIOS[name]
 
 

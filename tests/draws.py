@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import clarabel
 import numpy as np
 from numba import njit
 from pivoting.controller import WrenchProblem
@@ -11,6 +12,7 @@ from pivoting.controller.dispatch import smallest_wrench, workspace
 from pivoting.controller.interior_point import views
 from pivoting.controller.polish import polish
 from pivoting.controller.spatial_form import spatial_force
+from scipy import sparse
 
 SETS = ("scattered", "line", "point", "face", "plane", "edge")
 PIECES = ("inside", "edge", "floor", "rim", "apex")
@@ -157,3 +159,39 @@ def _closed_form(J, b, Q_w, Q_f, mu, f_min, residual, scratch):  # type: ignore[
         balancing_wrench(J[i], b[i], f, w)
         polish(J[i], Q_w[i], Q_f[i], work.H, mu[i], f_min[i], 3, work.piece, f, w, work)
         residual[i] = kkt_residual(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], w, f)
+
+
+def whitened_objective(problem: WrenchProblem) -> float:
+    """The optimum's cost by Clarabel in variables y with f = L^-T y, H = L L', where it is well conditioned.
+
+    nan where Clarabel does not say that it converged, to 1e-12. In the full form its own error is the larger.
+    """
+    n, K = problem.jacobian.shape[1], problem.contacts
+    J, b, Q_w = problem.jacobian, problem.required, problem.Q_w
+    L = np.linalg.cholesky(problem.Q_f + J.T @ Q_w @ J)
+    back = np.linalg.inv(L).T
+    g = back.T @ (J.T @ Q_w @ b)
+    unit = float(np.abs(g).max()) or 1.0
+    floors = [i for i in range(K) if problem.f_min[i] > 0.0]
+    rows, sides, cones = [], [], []
+    for i in floors:
+        size = np.linalg.norm(back[3 * i + 2])
+        rows.append(-back[3 * i + 2] / size)
+        sides.append(-problem.f_min[i] / (unit * size))
+    if floors:
+        cones.append(clarabel.NonnegativeConeT(len(floors)))
+    for i in range(K):
+        cone = -np.array([problem.mu_planned[i] * back[3 * i + 2], back[3 * i], back[3 * i + 1]])
+        rows += list(cone / np.abs(cone).max())
+        sides += [0.0] * 3
+        cones.append(clarabel.SecondOrderConeT(3))
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-12
+    settings.max_step_fraction = 0.95
+    A = sparse.csc_matrix(np.array(rows))
+    found = clarabel.DefaultSolver(
+        sparse.csc_matrix(np.eye(n)), -g / unit, A, np.array(sides), cones, settings
+    ).solve()  # fmt: skip
+    f = back @ (unit * np.array(found.x))
+    return problem.objective(b - J @ f, f) if str(found.status) == "Solved" else float("nan")

@@ -1,6 +1,7 @@
 """The command line as a stranger uses it: real processes, exit codes, one line for a wrong call."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -135,3 +136,37 @@ def test_help_and_version() -> None:
     assert pivoting("--help").returncode == 0
     assert pivoting("--version").stdout.startswith("pivoting 0.")
     assert "KEY=VALUE" in pivoting("run", "--help").stdout
+
+
+OWN = """<mujoco><worldbody><geom type="plane" size="1 1 1"/><body name="can" pos="0 0 .2"><freejoint/>
+<geom type="cylinder" size=".05 .1" mass=".4"/></body></worldbody></mujoco>"""
+
+
+def test_an_object_of_ones_own(tmp_path: Path) -> None:
+    """One JSON object, a recording and a summary; wrong calls in one line each, and nothing half-written."""
+    model, out = tmp_path / "can.xml", tmp_path / "out"
+    model.write_text(OWN)
+    own = ["run", "pivot", "--model", str(model), "--body", "can"]
+    done = pivoting(*own, "--contact", "vertex", "--set", "seconds=0.5", "--out", str(out), "--json")
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["verdict"] == "pass"
+    assert summary["body"] == "can"
+    assert len(summary["contacts"]) == 1
+    assert sorted(path.name for path in out.iterdir()) == ["pivot.rrd", "summary.json"]
+    for arguments, message in (
+        ([*own[:4]], "--body is missing"),
+        (["run", "pivot-2d", "--body", "can"], "only the scenario pivot takes it"),
+        ([*own, "--contact", "1,2"], "in the body frame"),
+        ([*own, "--contact", "a,b,c"], "--contact 'a,b,c'"),
+        ([*own, "--contact", "edge"], "contact = 'edge'"),
+        ([*own, "--set", "size=1"], "size = 1: the body is not a box"),
+        ([*own, "--set", "theta_end=170"], "reference = .*angles from 5 to 170 deg"),
+        ([*own, "--support", "moon"], "support = 'moon'"),
+        (["run", "pivot", "--model", str(tmp_path), "--body", "can"], "not a readable MJCF file"),
+    ):
+        wrong = pivoting(*arguments, "--out", str(tmp_path / "other"))
+        assert wrong.returncode == 2
+        assert re.search(message, wrong.stderr), wrong.stderr
+        assert len(wrong.stderr.strip().splitlines()) == 1
+        assert not list((tmp_path / "other").glob("*"))
