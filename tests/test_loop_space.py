@@ -215,3 +215,31 @@ def test_references_on_so3_in_a_loop_of_ones_own() -> None:
     mujoco.mj_kinematics(model, data)
     moved = data.xpos[1] + data.xmat[1].reshape(3, 3) @ vertex - where
     assert np.linalg.norm(moved[:2]) < 1e-4
+
+
+WEDGE = """<mujoco><asset><mesh name="w" vertex="0 0 0 .2 0 0 .05 0 .1 0 .1 0 .2 .1 0 .05 .1 .1"/></asset><worldbody>
+  <geom type="plane" size="1 1 1"/><body name="b" pos="0 0 .1"><joint type="slide" axis="1 0 0"/>
+    <joint type="slide" axis="0 0 1"/><joint type="hinge" axis="0 1 0"/><geom type="mesh" mesh="w"/></body>
+</worldbody></mujoco>"""
+
+
+def test_a_planar_object_of_ones_own(tmp_path: Path) -> None:
+    """The contact is the left end of its base; the arc ends where the next corner comes down, at 180 less its 63.4 deg."""
+    run = turn_object(tmp_path, WEDGE, "lowest")
+    assert run.truth.dim == 2
+    assert run.verdict == "pass"
+    with pytest.raises(ValueError, match=r"must be in \[0.1, 116.5\] deg"):
+        turn_object(tmp_path, WEDGE, "lowest", theta_end=130.0)
+    refused(tmp_path, WEDGE, "lowest corner", [0.0, 0.0, 0.05])
+
+
+def test_given_corners_are_turned_from_the_face_that_is_down(tmp_path: Path) -> None:
+    """A tall box standing: of the two faces that meet in the edge, the one that it stands on in its file."""
+    tall = BOX.replace("cylinder", "box").replace('size="{rod}"', 'size="0.01 0.01 0.01"')
+    standing = tall.format(
+        gravity="0 0 -9.81", dt="0.002", span="1", plane="1 0 0 0", origin="0 0 0", position="0 0 .3", quat="1 0 0 0",
+        size="0.03 0.04 0.07", offset="0 0 0", mass="0.4", rod="",
+    )  # fmt: skip
+    run = turn_object(tmp_path, standing, [[-0.03, -0.04, -0.07], [-0.03, 0.04, -0.07]])
+    assert run.verdict == "pass"
+    np.testing.assert_allclose(np.sort(run.face, axis=0)[:, 2], -0.07, atol=1e-9)
