@@ -343,7 +343,7 @@ if __name__ == "__main__":
     main(
         __doc__ or "",
         measure,
-        {f"K={K}, random problems: {KERNEL} / mj_step": bound for K, bound in ((1, 0.6), (4, 3.5))},
+        {f"K={K}, the block's own: {KERNEL} / mj_step": bound for K, bound in ((1, 0.6), (4, 3.5))},
         floors={f"space K={K}: {IN_PLACE}, times ours": floor for K, floor in ((1, 25.0), (2, 10.0), (4, 7.0))},
         markdown=markdown,
     )
