@@ -3,8 +3,7 @@
 One world: `simulate` (read, state, solve, certify, apply, step, log) against a loop of nothing but `mj_step`.
 256 worlds: against an open-loop `Batch.step` of the same motion, the run's own wrenches played back from its own start
 (bit for bit the same states, which is checked), and against one with a constant wrench, whose block hardly moves; that
-restarts every 200 steps, so that the block is still on its corner. Ratios are medians over
-pairs.
+restarts every 200 steps, so that the block is still on its corner. Ratios are medians over pairs.
 """
 
 import tempfile

@@ -224,7 +224,7 @@ WEDGE = """<mujoco><asset><mesh name="w" vertex="0 0 0 .2 0 0 .05 0 .1 0 .1 0 .2
 
 
 def test_a_planar_object_of_ones_own(tmp_path: Path) -> None:
-    """The contact is the left end of its base; the arc ends where the next corner comes down, at 180 less its 63.4 deg."""
+    """The contact is the left end of its base; the next corner comes down at 180 deg less its 63.4."""
     run = turn_object(tmp_path, WEDGE, "lowest")
     assert run.truth.dim == 2
     assert run.verdict == "pass"
