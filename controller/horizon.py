@@ -1,0 +1,145 @@
+"""The N-step program of the notes: wrenches, contact forces and poses over a horizon, stated as a convex program.
+
+    min  sum_t  1/2 w_t'Q_w w_t + 1/2 f_t'Q_f f_t + 1/2 e_t'Q e_t,    e_t from pose t to the desired pose t
+    s.t. motion (see `transcription`), friction cones, bounds on the wrench, and, if asked, contacts that do not move
+
+The contact Jacobian multiplies forces by poses, so that the program is bilinear: it is stated about a path, in
+corrections of its poses, and `plan` repeats that about its own answer until nothing changes.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pivoting.controller.bounds import WrenchBounds
+from pivoting.controller.controller import WrenchController
+from pivoting.controller.polygon import polygon
+from pivoting.controller.so3 import CONJUGATE, matrices, turned
+from pivoting.controller.space import quaternion_product, rotation_matrix
+from pivoting.controller.transcription import INTEGRATORS, Path
+from pivoting.controller.validate import Array, array, fail, number, one_of, positive_definite
+
+EDGES = 16  # of the polygon in which a QP keeps a planar force: up to 1 - cos(pi / 16) = 2 % of a bound is unused
+
+
+class BodyState(NamedTuple):
+    """CoM (3,) [m] and orientation (4,), object axes to world; their velocities (3,) in world axes [m/s, rad/s]."""
+
+    position: Array
+    orientation: Array
+    velocity: Array
+    angular_velocity: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Horizon:
+    """What is planned, over how many steps and how.
+
+    Attributes:
+        controller: the belief about object, contacts, friction (its margin included), gravity and weights Q_w, Q_f.
+        steps: N.  h: length of a step [s].
+        integrator: "quasi-dynamic" (the notes'), "implicit", "semi-implicit" or "forward"; see `transcription`.
+        Q: (nq, nq) weight on pose errors, (x, z, theta) in the plane, (translation in table axes, rotation vector in
+            object axes) in space; the notes' identity by default.
+        bounds: on the wrench.
+        stick: the contact points stay where they are; otherwise the desired arc merely suggests it.
+        clear: (P, 3) points of the object, from the CoM in object axes, that stay on or above the table; with none
+            of them a plan may turn the object into the table.
+        edges: of the inscribed polygon that stands for |force| in the plane; 0: the disc itself, which only
+            "clarabel" takes.
+    """
+
+    controller: WrenchController
+    steps: int
+    h: float
+    integrator: str
+    Q: Array
+    bounds: WrenchBounds
+    stick: bool
+    clear: Array
+    edges: int
+
+    def __init__(
+        self,
+        controller: WrenchController,
+        steps: int,
+        h: float,
+        *,
+        integrator: str = "quasi-dynamic",
+        Q: ArrayLike | None = None,
+        bounds: WrenchBounds | None = None,
+        stick: bool = False,
+        clear: ArrayLike | None = None,
+        edges: int = EDGES,
+    ):
+        if not isinstance(controller, WrenchController):
+            raise fail("controller", controller, "a WrenchController")
+        if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or not 1 <= steps <= 1000:
+            raise fail("steps", steps, "a whole number from 1 to 1000")
+        one_of("integrator", integrator, tuple(INTEGRATORS))
+        if bounds is not None and not isinstance(bounds, WrenchBounds):
+            raise fail("bounds", bounds, "WrenchBounds")
+        nw = len(controller.Q_w)
+        put = object.__setattr__
+        put(self, "controller", controller)
+        put(self, "steps", int(steps))
+        put(self, "h", number("h", h, above=0.0, unit="s"))
+        put(self, "integrator", integrator)
+        put(self, "Q", positive_definite("Q", np.eye(nw) if Q is None else Q, nw))
+        put(self, "bounds", WrenchBounds() if bounds is None else bounds)
+        put(self, "stick", bool(stick))
+        put(self, "clear", array("clear", np.zeros((0, 3)) if clear is None else clear, (None, 3)))
+        put(self, "edges", 0 if edges == 0 or controller.space.dim == 3 else len(polygon(edges).facets))
+        self.bounds.balls(nw)  # says what is wrong with them
+
+    @property
+    def unit(self) -> float:
+        """[N] of forces inside the program: the weight, or what accelerates the object by 1 m/s^2 without gravity."""
+        belief = self.controller.belief
+        return belief.mass * (float(np.linalg.norm(belief.gravity)) or 1.0)
+
+    @property
+    def length(self) -> float:
+        """[m] of translations inside the program: the lever from the CoM to the contacts, or to the farthest one."""
+        belief = self.controller.belief
+        return float(np.linalg.norm(belief.pivot)) or float(np.linalg.norm(belief.points, axis=1).max()) or 1.0
+
+    @cached_property
+    def table(self) -> Array:
+        """(3, 3) the table's axes as columns, world axes."""
+        return rotation_matrix(self.controller.base)
+
+    def start(self, state: BodyState) -> Path:
+        """Pose 0 alone, in table axes, and how it is reached; see `Path`."""
+        position = self.table.T @ np.asarray(state.position, dtype=float)
+        orientation = quaternion_product(self.controller.base * CONJUGATE, np.asarray(state.orientation, dtype=float))
+        rates = np.concatenate(
+            [
+                self.table.T @ np.asarray(state.velocity, dtype=float),
+                matrices(orientation).T @ (self.table.T @ np.asarray(state.angular_velocity, dtype=float)),
+            ]
+        )
+        kept = self.controller.belief.wrench_map
+        arriving = self.h * (kept.T @ (kept @ rates))
+        before = (position, orientation)
+        if INTEGRATORS[self.integrator][1] == 2:
+            position, orientation = position + arriving[:3], turned(orientation, arriving[3:])
+        return Path(position[None], orientation[None], before, arriving)
+
+    def arc(self, orientations: ArrayLike, state: BodyState) -> tuple[Array, Array]:
+        """Desired poses, in world axes, that turn about the contacts where they are now: (N, 3) CoMs, (N, 4).
+
+        Args:
+            orientations: (N, 4) quaternions object to world.
+        """
+        q = array("orientations", orientations, (self.steps, 4))
+        pivot = self.controller.belief.pivot
+        there = np.asarray(state.position) + matrices(np.asarray(state.orientation)) @ pivot
+        return there - matrices(q) @ pivot, q
+
+    def desired(self, positions: ArrayLike, orientations: ArrayLike) -> tuple[Array, Array]:
+        """Desired poses in table axes, from (N, 3) and (N, 4) in world axes."""
+        c, q = array("positions", positions, (self.steps, 3)), array("orientations", orientations, (self.steps, 4))
+        return c @ self.table, quaternion_product(self.controller.base * CONJUGATE, q)

@@ -1,0 +1,158 @@
+"""Planning: the horizon's program solved, stated again about its own answer until that changes no more, and judged."""
+
+from dataclasses import dataclass, field
+from time import perf_counter
+
+import numpy as np
+from pivoting.controller.conic_program import Solver, kkt_residual, solver
+from pivoting.controller.horizon import BodyState, Horizon
+from pivoting.controller.horizon_program import Guess, HorizonProgram
+from pivoting.controller.so3 import matrices
+from pivoting.controller.space import quaternion_product
+from pivoting.controller.transcription import Path, differences
+from pivoting.controller.validate import Array, fail, number
+
+RESIDUAL = 1e-6  # relative KKT residual of a pass's program up to which its answer is taken
+CONVERGED = 1e-9  # change of a pass, in weights, levers and radians
+STATUS = ("solved", "not converged", "infeasible", "failed")
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """An answer to a horizon's program, with how well it satisfies its own equations.
+
+    Attributes:
+        horizon: what was planned.
+        position: (N+1, 3) CoM [m], world axes.  orientation: (N+1, 4) object axes to world.
+        velocity, angular_velocity: (N+1, 3) with which each pose is reached, world axes [m/s, rad/s].
+        wrench: (N, nw) object axes [N, N m].  force: (N, K, d) contact axes [N]; step t leads to pose t + 1.
+        status: "solved", "not converged" (the last pass still changed more than `CONVERGED`), "infeasible" or "failed".
+        said: by the solver.
+        passes: how many programs were solved.  changes: by how much each changed the guess, in weights, levers, radians.
+        residual: relative KKT residual of the last program.
+        motion_defect: of the equations of motion themselves, not linearised, over the weight.
+        stick_defect: of the contacts staying put, over the lever; 0 if that was not asked.
+        objective: of the answer.
+        seconds: in all.  solver_seconds: inside the solver.
+    """
+
+    horizon: Horizon = field(repr=False)
+    position: Array
+    orientation: Array
+    velocity: Array
+    angular_velocity: Array
+    wrench: Array
+    force: Array
+    status: str
+    said: str
+    passes: int
+    changes: tuple[float, ...]
+    residual: float
+    motion_defect: float
+    stick_defect: float
+    objective: float
+    seconds: float
+    solver_seconds: float
+    guess: Guess = field(repr=False)
+
+
+class Planner:
+    """Plans for one horizon, with a solver whose structure is kept from plan to plan.
+
+    Args:
+        horizon: what to plan.
+        method: "clarabel", or in the plane "qp:<backend>" of qpsolvers; None: "qp:piqp" in the plane, else "clarabel".
+        options: of the solver.
+    """
+
+    def __init__(self, horizon: Horizon, method: str | None = None, **options: object):
+        self.horizon = horizon
+        self.program = HorizonProgram(horizon)
+        cones = bool(self.program.cones.orders)
+        self.method = method or ("clarabel" if cones else "qp:piqp")
+        if cones and self.method != "clarabel":
+            raise fail("method", method, '"clarabel": this program has second-order cones')
+        self._solve: Solver = solver(self.method, **options)
+
+    def guess(self, state: BodyState, desired: tuple[Array, Array]) -> Guess:
+        """About the desired poses, with no forces: J_c of the reference."""
+        start = self.horizon.start(state)
+        path = start._replace(
+            position=np.concatenate([start.position, desired[0]]),
+            orientation=np.concatenate([start.orientation, desired[1]]),
+        )
+        belief = self.horizon.controller.belief
+        N = self.horizon.steps
+        return Guess(path, np.zeros((N, len(belief.Q_w))), np.zeros((N, len(belief.Q_f))))
+
+    def plan(
+        self,
+        state: BodyState,
+        desired: tuple[Array, Array],
+        *,
+        guess: Guess | None = None,
+        applied: Array | None = None,
+        passes: int = 50,
+        tolerance: float = CONVERGED,
+    ) -> Plan:
+        """Plan from `state` towards poses (N, 3), (N, 4) in world axes.
+
+        Args:
+            guess: about which the first program is stated; default the desired poses.
+            applied: see `HorizonProgram.stated`.
+            passes: at most so many programs; with 1 the answer is that of the program about the guess.
+        """
+        number("tolerance", tolerance, above=0.0)
+        if isinstance(passes, bool) or not isinstance(passes, int) or passes < 1:
+            raise fail("passes", passes, "a whole number >= 1")
+        began = perf_counter()
+        wanted = self.horizon.desired(*desired)
+        now = self.guess(state, wanted) if guess is None else guess
+        changes: list[float] = []
+        inside, residual, status, said = 0.0, float("nan"), "failed", ""
+        for _ in range(passes):
+            program = self.program.stated(wanted, now, applied)
+            answer = self._solve(program)
+            inside += answer.seconds
+            residual, said = kkt_residual(program, answer), answer.said
+            if not residual <= RESIDUAL:
+                infeasible = "infeasible" in said.lower()
+                status = "infeasible" if infeasible else "failed"
+                break
+            now, change = self.program.corrected(now, answer.x)
+            changes.append(change)
+            status = "solved" if change <= tolerance else "not converged"
+            if status == "solved":
+                break
+        motion, stick = self.program.defects(now)
+        return self._finished(
+            now,
+            status=status,
+            said=said,
+            passes=len(changes),
+            changes=tuple(changes),
+            residual=residual,
+            motion_defect=motion,
+            stick_defect=stick,
+            objective=self.program.objective(wanted, now),
+            seconds=perf_counter() - began,
+            solver_seconds=inside,
+        )
+
+    def _finished(self, guess: Guess, **said: object) -> Plan:
+        """The guess in world axes."""
+        horizon, path = self.horizon, guess.path
+        table, base = horizon.table, horizon.controller.base
+        rates = differences(path)[0] / horizon.h
+        R = matrices(path.orientation)
+        values = dict(
+            position=path.position @ table.T,
+            orientation=quaternion_product(base, path.orientation),
+            velocity=rates[:, :3] @ table.T,
+            angular_velocity=(R @ rates[:, 3:, None])[..., 0] @ table.T,
+            wrench=guess.wrench,
+            force=guess.force.reshape(horizon.steps, -1, horizon.controller.space.dim),
+        )
+        for value in values.values():
+            value.flags.writeable = False
+        return Plan(horizon=horizon, guess=guess, **values, **said)  # type: ignore[arg-type]
