@@ -9,7 +9,9 @@ from time import perf_counter
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from pivoting.controller.block_matrix import Sparse
 from pivoting.controller.conic import CLARABEL
+from pivoting.controller.kernel import kernel
 from pivoting.controller.validate import Array, fail
 from scipy import sparse
 
@@ -42,12 +44,14 @@ class Cones(NamedTuple):
 
 
 class ConicProgram(NamedTuple):
-    """P: (n, n) upper triangle, sparse.  A: (m, n), sparse.  The sparsity patterns hold every entry that may be other
-    than zero, so that two programs of one origin have the same."""
+    """P: (n, n) upper triangle.  A: (m, n).
 
-    P: Any
+    Their patterns hold every entry that may be other than zero, so that two programs of one origin have the same.
+    """
+
+    P: Sparse
     q: Array
-    A: Any
+    A: Sparse
     b: Array
     cones: Cones
 
@@ -99,30 +103,32 @@ class ClarabelInPlace:
         zero, linear, orders = program.cones
         cones = [clarabel.ZeroConeT(zero), clarabel.NonnegativeConeT(linear)]
         cones += [clarabel.SecondOrderConeT(order) for order in orders]
-        return clarabel.DefaultSolver(program.P, program.q, program.A, program.b, cones, settings)
+        return clarabel.DefaultSolver(program.P.csc(), program.q, program.A.csc(), program.b, cones, settings)
 
 
 class QuadraticBackend:
-    """A backend of qpsolvers, which takes programs without second-order cones."""
+    """A backend of qpsolvers, which takes programs without second-order cones; conversions are kept for one pattern."""
 
     def __init__(self, backend: str, **options: Any):
         self._backend = backend
         self._options = {**_QP.get(backend, {}), **options}
+        self._split: _Split | None = None
 
     def __call__(self, program: ConicProgram) -> Answer:
         import qpsolvers
 
-        zero, linear, orders = program.cones
-        if orders:
+        zero = program.cones.zero
+        if program.cones.orders:
             raise fail("method", f"qp:{self._backend}", "clarabel: the program has second-order cones")
         start = perf_counter()
-        P = program.P + sparse.triu(program.P, 1, format="csc").T
-        rows = program.A.tocsr()
-        A, G = rows[:zero].tocsc(), rows[zero:].tocsc()
-        if self._backend in qpsolvers.dense_solvers:
+        if self._split is None or not self._split.fits(program):
+            self._split = _Split(program)
+        P, A, G = self._split(program)
+        if self._backend not in qpsolvers.sparse_solvers:
             P, A, G = (matrix.toarray() for matrix in (P, A, G))
-        stated = qpsolvers.Problem(P, program.q, G, program.b[zero:], A, program.b[:zero])
-        none = Answer(np.full(P.shape[0], np.nan), np.full(len(program.b), np.nan), "", 0.0)
+        b = program.b
+        stated = qpsolvers.Problem(P, program.q, G, b[zero:], A, b[:zero])
+        none = Answer(np.full(len(program.q), np.nan), np.full(len(b), np.nan), "", 0.0)
         try:
             found = qpsolvers.solve_problem(stated, solver=self._backend, **self._options)
         except Exception as error:  # each backend has its own: what it says is kept, and there is no answer
@@ -132,6 +138,27 @@ class QuadraticBackend:
             return none._replace(said="not found", seconds=seconds)
         said = "Solved" if found.found else "not found"
         return Answer(np.asarray(found.x), np.concatenate([found.y, found.z]), said, seconds)
+
+
+class _Split:
+    """Takes programs of one pattern apart: the full P, the rows of equality, the others."""
+
+    def __init__(self, program: ConicProgram):
+        self._pattern = [program.P.indptr, program.P.indices, program.A.indptr, program.A.indices]
+        zero = program.cones.zero
+        upper, rows = (m._replace(data=np.arange(1.0, len(m.data) + 1.0)).csc() for m in (program.P, program.A))
+        whole = upper + sparse.triu(upper, 1, format="csc").T
+        self._matrices = [part.tocsc() for part in (whole, rows.tocsr()[:zero], rows.tocsr()[zero:])]
+        self._entries = [part.data.astype(np.int64) - 1 for part in self._matrices]
+
+    def fits(self, program: ConicProgram) -> bool:
+        given = [program.P.indptr, program.P.indices, program.A.indptr, program.A.indices]
+        return all(a is b or np.array_equal(a, b) for a, b in zip(self._pattern, given, strict=True))
+
+    def __call__(self, program: ConicProgram) -> list[Any]:
+        for part, entries, source in zip(self._matrices, self._entries, (program.P, program.A, program.A), strict=True):
+            part.data = source.data[entries]
+        return self._matrices
 
 
 def solver(method: str, **options: Any) -> Solver:
@@ -155,30 +182,51 @@ def kkt_residual(program: ConicProgram, answer: Answer) -> float:
 
     Each relative to its own largest term, at least 1; nan if the answer is not finite.
     """
-    x, z = answer.x, answer.z
-    P = program.P
-    curved = P @ x + P.T @ x - P.diagonal() * x
-    s = program.b - program.A @ x
-    terms = abs(program.A) @ np.abs(x)
-    primal = outside(s, program.cones) / max(1.0, float(np.max(terms, initial=0.0)))
-    dual = outside(z, program.cones, dual=True) / max(1.0, float(np.max(np.abs(z), initial=0.0)))
-    pull = program.A.T @ z
-    scale = max(1.0, *(float(np.abs(part).max(initial=0.0)) for part in (curved, program.q, pull)))
-    stationary = float(np.abs(curved + program.q + pull).max()) / scale
-    cost = abs(0.5 * x @ curved) + abs(program.q @ x)
-    gap = abs(float(s @ z)) / max(1.0, cost)
-    return float(np.max([primal, dual, stationary, gap]))
+    P, A, (zero, linear, orders) = program.P, program.A, program.cones
+    sizes = np.array(orders, dtype=np.int64)
+    matrices = P.data, P.indices, P.indptr, A.data, A.indices, A.indptr
+    return float(_residual(*matrices, program.q, program.b, zero, linear, sizes, answer.x, answer.z))
 
 
-def outside(s: Array, cones: Cones, *, dual: bool = False) -> float:
+@kernel
+def _residual(P, P_row, P_column, A, A_row, A_column, q, b, zero, linear, orders, x, z):  # type: ignore[no-untyped-def]
+    n, m = q.shape[0], b.shape[0]
+    curved, pull, s, terms = np.zeros(n), np.zeros(n), b.copy(), np.zeros(m)
+    for j in range(n):
+        for k in range(P_column[j], P_column[j + 1]):
+            i = P_row[k]
+            curved[i] += P[k] * x[j]
+            if i != j:
+                curved[j] += P[k] * x[i]
+        for k in range(A_column[j], A_column[j + 1]):
+            i = A_row[k]
+            pull[j] += A[k] * z[i]
+            s[i] -= A[k] * x[j]
+            terms[i] += abs(A[k] * x[j])
+    primal, dual = _outside(s, zero, linear, orders, False), _outside(z, zero, linear, orders, True)
+    primal /= max(1.0, np.abs(terms).max())
+    dual /= max(1.0, np.abs(z).max())
+    scale = max(1.0, np.abs(curved).max(), np.abs(q).max(), np.abs(pull).max())
+    stationary = np.abs(curved + q + pull).max() / scale
+    cost = 0.5 * abs((x * curved).sum()) + abs((q * x).sum())
+    gap = abs((s * z).sum()) / max(1.0, cost)
+    return max(primal, dual, stationary, gap) if np.isfinite(primal + dual + stationary + gap) else np.nan
+
+
+@kernel
+def _outside(s, zero, linear, orders, dual):  # type: ignore[no-untyped-def]
     """How far s is from its cone, the greatest over its parts; `dual`: the dual cone, which leaves equalities free."""
-    zero, linear, orders = cones
-    worst = 0.0 if dual else float(np.abs(s[:zero]).max(initial=0.0))
-    worst = max(worst, float((-s[zero : zero + linear]).max(initial=0.0)))
-    if orders:
-        at = zero + linear
-        for size in sorted(set(orders)):
-            starts = at + np.concatenate([[0], np.cumsum(orders)[:-1]])[np.array(orders) == size]
-            part = s[starts[:, None] + np.arange(size)]
-            worst = max(worst, float((np.linalg.norm(part[:, 1:], axis=1) - part[:, 0]).max()))
-    return worst if np.isfinite(s).all() else float("nan")
+    worst = 0.0
+    for i in range(zero + linear):
+        if i >= zero:
+            worst = max(worst, -s[i])
+        elif not dual:
+            worst = max(worst, abs(s[i]))
+    first = zero + linear
+    for size in orders:
+        length = 0.0
+        for i in range(first + 1, first + size):
+            length += s[i] * s[i]
+        worst = max(worst, np.sqrt(length) - s[first])
+        first += size
+    return worst

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.controller import WrenchController
 from pivoting.controller.polygon import polygon
-from pivoting.controller.so3 import CONJUGATE, matrices, turned
+from pivoting.controller.so3 import CONJUGATE, exponential, rotated
 from pivoting.controller.space import quaternion_product, rotation_matrix
 from pivoting.controller.transcription import INTEGRATORS, Path
 from pivoting.controller.validate import Array, array, fail, number, one_of, positive_definite
@@ -113,19 +113,17 @@ class Horizon:
 
     def start(self, state: BodyState) -> Path:
         """Pose 0 alone, in table axes, and how it is reached; see `Path`."""
+        base = self.controller.base * CONJUGATE
         position = self.table.T @ np.asarray(state.position, dtype=float)
-        orientation = quaternion_product(self.controller.base * CONJUGATE, np.asarray(state.orientation, dtype=float))
-        rates = np.concatenate(
-            [
-                self.table.T @ np.asarray(state.velocity, dtype=float),
-                matrices(orientation).T @ (self.table.T @ np.asarray(state.angular_velocity, dtype=float)),
-            ]
-        )
+        orientation = quaternion_product(base, np.asarray(state.orientation, dtype=float))
+        spin = rotated(np.asarray(state.orientation) * CONJUGATE, np.asarray(state.angular_velocity, dtype=float))
+        rates = np.concatenate([self.table.T @ np.asarray(state.velocity, dtype=float), spin])
         kept = self.controller.belief.wrench_map
         arriving = self.h * (kept.T @ (kept @ rates))
-        before = (position, orientation)
+        before = np.concatenate([position, orientation])
         if INTEGRATORS[self.integrator][1] == 2:
-            position, orientation = position + arriving[:3], turned(orientation, arriving[3:])
+            position = position + arriving[:3]
+            orientation = quaternion_product(orientation, exponential(arriving[3:]))
         return Path(position[None], orientation[None], before, arriving)
 
     def arc(self, orientations: ArrayLike, state: BodyState) -> tuple[Array, Array]:
@@ -136,10 +134,10 @@ class Horizon:
         """
         q = array("orientations", orientations, (self.steps, 4))
         pivot = self.controller.belief.pivot
-        there = np.asarray(state.position) + matrices(np.asarray(state.orientation)) @ pivot
-        return there - matrices(q) @ pivot, q
+        there = np.asarray(state.position) + rotated(np.asarray(state.orientation), pivot)
+        return there - rotated(q, pivot), q
 
     def desired(self, positions: ArrayLike, orientations: ArrayLike) -> tuple[Array, Array]:
         """Desired poses in table axes, from (N, 3) and (N, 4) in world axes."""
         c, q = array("positions", positions, (self.steps, 3)), array("orientations", orientations, (self.steps, 4))
-        return c @ self.table, quaternion_product(self.controller.base * CONJUGATE, q)
+        return np.ascontiguousarray(c @ self.table), quaternion_product(self.controller.base * CONJUGATE, q)

@@ -10,9 +10,10 @@ import numpy as np
 from pivoting.controller.block_matrix import BlockMatrix, Part
 from pivoting.controller.conic_program import ConicProgram, Cones
 from pivoting.controller.horizon import Horizon
+from pivoting.controller.horizon_rows import fill_clearance, fill_sticking, fill_tracking
 from pivoting.controller.limits import friction_limits, wrench_limits
-from pivoting.controller.so3 import difference, difference_jacobians, exponential, hat, matrices, turned
-from pivoting.controller.transcription import Path, linearised
+from pivoting.controller.so3 import exponential, turn_by
+from pivoting.controller.transcription import INTEGRATORS, Mechanics, Path, fill_motion, motion_rows
 from pivoting.controller.validate import Array
 
 
@@ -24,25 +25,44 @@ class Guess(NamedTuple):
     force: Array
 
 
+class _Rows(NamedTuple):
+    """What depends on a guess: rows of motion (five blocks), sticking and clearance, and their right-hand sides."""
+
+    motion: list[Array]
+    sticking: Array
+    clearance: Array
+    sides: tuple[Array, Array, Array]
+
+
 class HorizonProgram:
     """States the programs of one horizon; all in it is constant."""
 
     def __init__(self, horizon: Horizon):
         belief, space, N = horizon.controller.belief, horizon.controller.space, horizon.steps
         self.horizon, self._belief = horizon, belief
-        self._gravity = horizon.table.T @ belief.gravity
-        self._frames = horizon.table.T @ belief.frames @ belief.force_map  # (K, 3, d)
+        used, component = np.nonzero(belief.wrench_map)
+        self._body = Mechanics(
+            mass=belief.mass,
+            inertia=np.ascontiguousarray(belief.inertia),
+            points=belief.points,
+            pivot=belief.pivot,
+            frames=np.ascontiguousarray(horizon.table.T @ belief.frames @ belief.force_map),
+            gravity=horizon.table.T @ belief.gravity,
+            pick=component,
+            sign=belief.wrench_map[used, component],
+        )
         nq, n = len(belief.Q_w), len(belief.Q_f)
         lengths = np.array([1.0] * space.dim + [horizon.length] * (nq - space.dim))
         self._pose_unit, self._wrench_unit = horizon.length / lengths, horizon.unit * lengths
         self._fixed = _fixed(belief.points, belief.pivot, belief.wrench_map, horizon.length)
+        self._sticking = space.dim + len(self._fixed) if horizon.stick else 0
         self._friction = friction_limits(belief.mu, belief.f_min / horizon.unit, space.dim)
         self._bounds = wrench_limits(horizon.bounds, nq, horizon.edges, self._wrench_unit, horizon.h)
-        self._weights = [self._wrench_unit[:, None] * belief.Q_w * self._wrench_unit / horizon.unit**2, belief.Q_f]
-        sticking = space.dim + len(self._fixed) if horizon.stick else 0
+        self._Q = np.array(horizon.Q) / horizon.unit**2
+        weights = [self._wrench_unit[:, None] * belief.Q_w * self._wrench_unit / horizon.unit**2, belief.Q_f]
         linear = [len(self._friction.linear), len(self._bounds.linear), len(horizon.clear)]
         cones = [len(self._friction.cone), len(self._bounds.cone)]
-        tall = nq + sticking, sum(linear), sum(cones)
+        tall = nq + self._sticking, sum(linear), sum(cones)
         self.cones = Cones(N * tall[0], N * tall[1], N * (self._friction.orders + self._bounds.orders))
         self._wide = 2 * nq + n
         pose, wrench, force = (np.arange(a, b) for a, b in ((0, nq), (nq, 2 * nq), (2 * nq, self._wide)))
@@ -53,39 +73,39 @@ class HorizonProgram:
             rows = N * sum(tall[:group]) + tall[group] * steps + first + np.arange(len(mask))
             return Part(rows, self._wide * (steps - lag) + columns, mask != 0.0)
 
-        motion, sticks, cleared, tracked = self._generic_masks()
-        limits, bound = (self._friction, self._bounds), self._bounds
+        seen, tracked = self._generic()
+        own, bound = self._friction, self._bounds
+        rates = bound.linear * bound.linear_rate[:, None], bound.cone * bound.cone_rate[:, None]
         self._A = BlockMatrix(
             (N * sum(tall), N * self._wide),
             [
-                *(part(0, 0, mask, pose, lag) for lag, mask in enumerate(motion[:3])),
-                *(part(0, 0, mask, columns) for mask, columns in zip(motion[3:], (wrench, force), strict=True)),
-                part(0, nq, sticks, pose),
-                part(1, 0, limits[0].linear, force),
+                *(part(0, 0, mask, pose, lag) for lag, mask in enumerate(seen.motion[:3])),
+                part(0, 0, seen.motion[3], wrench),
+                part(0, 0, seen.motion[4], force),
+                part(0, nq, seen.sticking, pose),
+                part(1, linear[0] + linear[1], seen.clearance, pose),
+                part(1, 0, own.linear, force),
                 part(1, linear[0], bound.linear, wrench),
-                part(1, linear[0], bound.linear * bound.linear_rate[:, None], wrench, 1),
-                part(1, linear[0] + linear[1], cleared, pose),
-                part(2, 0, limits[0].cone, force),
+                part(1, linear[0], rates[0], wrench, 1),
+                part(2, 0, own.cone, force),
                 part(2, cones[0], bound.cone, wrench),
-                part(2, cones[0], bound.cone * bound.cone_rate[:, None], wrench, 1),
+                part(2, cones[0], rates[1], wrench, 1),
             ],
         )
-        self._constant = [
-            [limits[0].linear, bound.linear, -bound.linear * bound.linear_rate[:, None]],
-            [limits[0].cone, bound.cone, -bound.cone * bound.cone_rate[:, None]],
-        ]
+        self._still = [_repeated(block, N) for block in (own.linear, bound.linear)]
+        self._still += [_repeated(-rates[0], N - 1), _repeated(own.cone, N), _repeated(bound.cone, N)]
+        self._still += [_repeated(-rates[1], N - 1)]
+        self._weights = [_repeated(weight, N) for weight in weights]
         here = np.arange(N)[:, None]
         self._P = BlockMatrix(
             (N * self._wide, N * self._wide),
             [
                 Part(self._wide * here + columns, self._wide * here + columns, np.triu(mask) != 0.0)
-                for columns, mask in zip((pose, wrench, force), (tracked, *self._weights), strict=True)
+                for columns, mask in zip((pose, wrench, force), (tracked, *weights), strict=True)
             ],
         )
 
-    def stated(
-        self, desired: tuple[Array, Array], guess: Guess, applied: Array | None = None
-    ) -> ConicProgram:
+    def stated(self, desired: tuple[Array, Array], guess: Guess, applied: Array | None = None) -> ConicProgram:
         """The program about a guess.
 
         Args:
@@ -93,115 +113,102 @@ class HorizonProgram:
             guess: its path begins where the object is, see `Horizon.start`.
             applied: (nw,) wrench until now, for bounds on its rate; None: not known, and the first one is free of them.
         """
-        N = self.horizon.steps
-        motion, sticks, cleared, sides = self._rows(guess)
+        N, nq = self.horizon.steps, len(self._pose_unit)
+        rows = self._rows(guess)
+        A = self._A.filled(
+            [
+                *(block[lag:] for block, lag in zip(rows.motion, (0, 1, 2, 0, 0), strict=True)),
+                rows.sticking,
+                rows.clearance,
+                *self._still,
+            ]
+        )
         before = None if applied is None else np.asarray(applied, dtype=float) / self._wrench_unit
-        linear, cone = self._bounds.sides(N, before)
-        constant = [
-            [np.broadcast_to(block, (N - lag, *block.shape)) for block, lag in zip(blocks, (0, 0, 1), strict=True)]
-            for blocks in self._constant
-        ]
-        A = self._A.filled([*(block[lag:] for block, lag in zip(motion, (0, 1, 2, 0, 0), strict=True)), sticks, *constant[0], cleared, *constant[1]])
-        friction = (np.broadcast_to(side, (N, len(side))) for side in (self._friction.linear_side, self._friction.cone_side))
-        linear, cone = (np.hstack([own, side]) for own, side in zip(friction, (linear, cone), strict=True))
-        b = np.concatenate([np.hstack(sides[:2]).ravel(), np.hstack([linear, sides[2]]).ravel(), cone.ravel()])
-        cost, slope = self._tracking(guess.path, desired)
-        weights = [np.broadcast_to(weight, (N, *weight.shape)) for weight in self._weights]
+        bounds = self._bounds.sides(N, before)
+        own = self._friction
+        b = np.concatenate(
+            [
+                np.hstack(rows.sides[:2]).ravel(),
+                np.hstack([_repeated(own.linear_side, N), bounds[0], rows.sides[2]]).ravel(),
+                np.hstack([_repeated(own.cone_side, N), bounds[1]]).ravel(),
+            ]
+        )
+        curvature, slope, _ = self._tracking(guess.path, desired)
         q = np.zeros((N, self._wide))
-        q[:, : slope.shape[1]] = slope
-        return ConicProgram(self._P.filled([cost, *weights]), q.ravel(), A, b, self.cones)
+        q[:, :nq] = slope * self._pose_unit
+        scaled = self._pose_unit[:, None] * curvature * self._pose_unit
+        return ConicProgram(self._P.filled([scaled, *self._weights]), q.ravel(), A, b, self.cones)
 
     def corrected(self, guess: Guess, x: Array) -> tuple[Guess, float]:
         """The guess with an answer's corrections and its wrenches and forces, and the greatest change of any of them.
 
         The change is in units of the weight and the lever, and of radians.
         """
-        nq = len(self._pose_unit)
+        nq, unit = len(self._pose_unit), self.horizon.unit
         steps = x.reshape(self.horizon.steps, self._wide)
-        moved = steps[:, :nq] * self._pose_unit @ self._belief.wrench_map
-        path = guess.path._replace(
-            position=np.concatenate([guess.path.position[:1], guess.path.position[1:] + moved[:, :3]]),
-            orientation=np.concatenate([guess.path.orientation[:1], turned(guess.path.orientation[1:], moved[:, 3:])]),
-        )
-        wrench, force = steps[:, nq : 2 * nq] * self._wrench_unit, steps[:, 2 * nq :] * self.horizon.unit
-        changes = steps[:, :nq], (wrench - guess.wrench) / self._wrench_unit, (force - guess.force) / self.horizon.unit
+        moved = (steps[:, :nq] * self._pose_unit) @ self._belief.wrench_map
+        position, orientation = guess.path.position.copy(), guess.path.orientation.copy()
+        position[1:] += moved[:, :3]
+        turn_by(orientation[1:], moved[:, 3:])
+        wrench, force = steps[:, nq : 2 * nq] * self._wrench_unit, steps[:, 2 * nq :] * unit
+        changes = steps[:, :nq], (wrench - guess.wrench) / self._wrench_unit, (force - guess.force) / unit
+        path = guess.path._replace(position=position, orientation=orientation)
         return Guess(path, wrench, force), max(float(np.abs(change).max()) for change in changes)
 
     def defects(self, guess: Guess) -> tuple[float, float]:
-        """How far a guess is from its own equations, not linearised: of motion, in weights, and of sticking, in levers."""
-        motion, _, _, sides = self._rows(guess)
+        """How far a guess is from its own equations, not linearised: motion in weights, sticking in levers, radians."""
+        rows = self._rows(guess)
         wrench, force = guess.wrench / self._wrench_unit, guess.force / self.horizon.unit
-        left = (motion[3] @ wrench[..., None] + motion[4] @ force[..., None])[..., 0] - sides[0]
-        return float(np.abs(left).max()), float(np.abs(sides[1]).max(initial=0.0))
+        left = (rows.motion[3] @ wrench[..., None] + rows.motion[4] @ force[..., None])[..., 0] - rows.sides[0]
+        return float(np.abs(left).max()), float(np.abs(rows.sides[1]).max(initial=0.0))
 
     def objective(self, desired: tuple[Array, Array], guess: Guess) -> float:
         """sum 1/2 w'Q_w w + 1/2 f'Q_f f + 1/2 e'Q e, in SI units, poses taken as they are."""
-        belief, error = self._belief, self._error(guess.path, desired)
+        belief, error = self._belief, self._tracking(guess.path, desired)[2]
         terms = ((guess.wrench, belief.Q_w), (guess.force, belief.Q_f), (error, self.horizon.Q))
-        return 0.5 * sum(float(np.einsum("ti,ij,tj->", value, weight, value)) for value, weight in terms)
+        return 0.5 * sum(float(((value @ weight) * value).sum()) for value, weight in terms)
 
-    def _rows(self, guess: Guess) -> tuple[list[Array], Array, Array, list[Array]]:
-        """What depends on the guess: blocks of motion, sticking and clearance, and the right-hand sides of the three."""
-        horizon, belief, path = self.horizon, self._belief, guess.path
-        motion = linearised(
-            belief, self._frames, self._gravity, horizon.h, horizon.integrator, path, guess.wrench, guess.force
-        )
-        rows = 1.0 / self._wrench_unit
-        blocks = [rows[:, None] * block * self._pose_unit for block in motion.towards]
-        blocks.append(-rows[:, None] * motion.wrench_gain * self._wrench_unit)
-        blocks.append(-rows[:, None] * motion.force_gain * horizon.unit)
-        N, length = horizon.steps, horizon.length
-        R, (there, then) = matrices(path.orientation[1:]), path.before
-        R_0, W = matrices(then), belief.wrench_map
-        sticks, off = np.zeros((N, 0, len(W))), np.zeros((N, 0))
-        if horizon.stick:
-            moving = np.concatenate([np.broadcast_to(np.eye(3), R.shape), -R @ hat(belief.pivot)], axis=2)
-            seen = R.transpose(0, 2, 1) @ (R_0 @ self._fixed[:, 1].T)  # (N, 3, D): each e_0 in object axes
-            seen = np.moveaxis(seen, 2, 1)
-            turning = np.zeros((N, len(self._fixed), 6))
-            turning[:, :, 3:] = (self._fixed[:, 0, None, :] @ hat(seen))[:, :, 0]
-            shift = path.position[1:] + R @ belief.pivot - there - R_0 @ belief.pivot
-            picked = belief.force_map.T
-            sticks = np.concatenate([picked @ moving / length, turning], axis=1) @ W.T * self._pose_unit
-            off = np.concatenate([shift @ picked.T / length, (self._fixed[:, 0] * seen).sum(axis=2)], axis=1)
-        cleared, height = np.zeros((N, 0, len(W))), np.zeros((N, 0))
+    def _rows(self, guess: Guess) -> _Rows:
+        horizon, body, N = self.horizon, self._body, self.horizon.steps
+        nq, length, path = len(self._pose_unit), horizon.length, guess.path
+        motion = motion_rows(N, nq, guess.force.shape[1])
+        order, lag = INTEGRATORS[horizon.integrator]
+        fill_motion(body, order, lag, horizon.h, path, guess.wrench, guess.force, motion)
+        sticking, off = np.empty((N, self._sticking, nq)), np.empty((N, self._sticking))
+        if self._sticking:
+            fill_sticking(body, self._fixed, horizon.controller.space.dim == 2, length, path, sticking, off)
+        clearance, room = np.empty((N, len(horizon.clear), nq)), np.empty((N, len(horizon.clear)))
         if len(horizon.clear):
-            floor = there[2] + (belief.points @ R_0.T)[:, 2].min()
-            height = path.position[1:, 2:] + (R @ horizon.clear.T)[:, 2] - floor
-            lifting = np.zeros((N, len(horizon.clear), 6))
-            lifting[:, :, 2] = 1.0
-            lifting[:, :, 3:] = -(R[:, None] @ hat(horizon.clear))[:, :, 2]
-            cleared, height = -lifting @ W.T * self._pose_unit / length, height / length
-        return blocks, sticks, cleared, [-motion.constant * rows, -off, height]
+            fill_clearance(body, np.array(horizon.clear), length, path, clearance, room)
+        rows = 1.0 / self._wrench_unit
+        towards = rows[:, None] * motion.towards * self._pose_unit
+        gains = rows[:, None] * motion.by_wrench * self._wrench_unit, rows[:, None] * motion.by_force * horizon.unit
+        sides = -motion.constant * rows, off, room
+        return _Rows([*towards, *gains], sticking * self._pose_unit, clearance * self._pose_unit, sides)
 
-    def _error(self, path: Path, desired: tuple[Array, Array]) -> Array:
-        """(N, nq) from the path's poses to the desired ones."""
-        shift, turn = desired[0] - path.position[1:], difference(path.orientation[1:], desired[1])
-        return np.hstack([shift, turn]) @ self._belief.wrench_map.T
+    def _tracking(self, path: Path, desired: tuple[Array, Array]) -> tuple[Array, Array, Array]:
+        """Curvature (N, nq, nq), slope (N, nq) and errors (N, nq) of the cost of tracking, in SI units."""
+        N, nq = self.horizon.steps, len(self._pose_unit)
+        out = np.empty((N, nq, nq)), np.empty((N, nq)), np.empty((N, nq))
+        fill_tracking(self._body, self._Q, path, *desired, *out)
+        return out
 
-    def _tracking(self, path: Path, desired: tuple[Array, Array]) -> tuple[Array, Array]:
-        """Curvature (N, nq, nq) and slope (N, nq) of the cost of tracking, by corrections of the poses."""
-        W, Q = self._belief.wrench_map, self.horizon.Q / self.horizon.unit**2
-        turn = difference(path.orientation[1:], desired[1])
-        by_pose = np.zeros((len(turn), 6, 6))
-        by_pose[:, :3, :3], by_pose[:, 3:, 3:] = -np.eye(3), difference_jacobians(turn)[1]
-        J = W @ by_pose @ W.T * self._pose_unit
-        error = self._error(path, desired)
-        return J.transpose(0, 2, 1) @ Q @ J, ((error @ Q)[:, None] @ J)[:, 0]
-
-    def _generic_masks(self) -> tuple[list[Array], Array, Array, Array]:
-        """What of the blocks may be other than zero: seen on a path without any symmetry."""
+    def _generic(self) -> tuple[_Rows, Array]:
+        """Which entries of the blocks may be other than zero: seen on a path without any symmetry."""
         rng, N, W = np.random.default_rng(0), self.horizon.steps, self._belief.wrench_map
         vectors = rng.normal(size=(2 * N + 3, len(W))) @ W
-        poses = 0.3 * vectors[: N + 1, :3], exponential(vectors[: N + 1, 3:])
-        before = (vectors[-1, :3], exponential(vectors[-1, 3:]))
-        path = Path(*poses, before, vectors[-2])
+        turns = exponential(vectors[:, 3:])
+        path = Path(vectors[: N + 1, :3], turns[: N + 1], np.concatenate([vectors[-1, :3], turns[-1]]), vectors[-2])
         guess = Guess(path, rng.normal(size=(N, len(W))), rng.normal(size=(N, len(self._belief.Q_f))))
-        motion, sticks, cleared, _ = self._rows(guess)
-        wanted = vectors[N + 1 : 2 * N + 1]
-        tracked, _ = self._tracking(path, (wanted[:, :3], exponential(wanted[:, 3:])))
-        masks = [np.abs(block).max(axis=0) > 1e-14 for block in (*motion, sticks, cleared, tracked)]
-        return masks[:5], *masks[5:]  # type: ignore[return-value]
+        rows = self._rows(guess)
+        wanted = np.ascontiguousarray(vectors[N + 1 : 2 * N + 1, :3]), turns[N + 1 : 2 * N + 1]
+        curvature = self._tracking(path, wanted)[0]
+        masks = [np.abs(block).max(axis=0) > 1e-14 for block in (*rows.motion, rows.sticking, rows.clearance)]
+        return _Rows(masks[:5], masks[5], masks[6], rows.sides), np.abs(curvature).max(axis=0) > 1e-14
+
+
+def _repeated(block: Array, steps: int) -> Array:
+    return np.broadcast_to(block, (steps, *block.shape))
 
 
 def _fixed(points: Array, pivot: Array, wrench_map: Array, length: float) -> Array:
@@ -210,8 +217,7 @@ def _fixed(points: Array, pivot: Array, wrench_map: Array, length: float) -> Arr
     Contacts stay put if their mean does and, where they are on a line, that line does not turn; off a line, nothing
     turns. Rows for every point would say the same several times over.
     """
-    _, spread, axes = np.linalg.svd(points - pivot)
-    along, across, normal = axes
+    _, spread, (along, across, normal) = np.linalg.svd(points - pivot)
     rank = min(2, int(np.count_nonzero(spread > 1e-9 * length)))
     pairs = [[], [(across, along), (normal, along)], [(across, along), (normal, along), (normal, across)]][rank]
     kept = np.array(pairs, dtype=float).reshape(-1, 2, 3)

@@ -7,9 +7,8 @@ import numpy as np
 from pivoting.controller.conic_program import Solver, kkt_residual, solver
 from pivoting.controller.horizon import BodyState, Horizon
 from pivoting.controller.horizon_program import Guess, HorizonProgram
-from pivoting.controller.so3 import matrices
+from pivoting.controller.so3 import fill_differences, rotated
 from pivoting.controller.space import quaternion_product
-from pivoting.controller.transcription import Path, differences
 from pivoting.controller.validate import Array, fail, number
 
 RESIDUAL = 1e-6  # relative KKT residual of a pass's program up to which its answer is taken
@@ -142,14 +141,17 @@ class Planner:
     def _finished(self, guess: Guess, **said: object) -> Plan:
         """The guess in world axes."""
         horizon, path = self.horizon, guess.path
-        table, base = horizon.table, horizon.controller.base
-        rates = differences(path)[0] / horizon.h
-        R = matrices(path.orientation)
+        table, count = horizon.table, len(path.position)
+        rates = np.empty((count, 6))
+        rates[0], rates[1:, :3] = path.arriving, np.diff(path.position, axis=0)
+        fill_differences(path.orientation, rates[1:, 3:])
+        rates /= horizon.h
+        orientation = quaternion_product(horizon.controller.base, path.orientation)
         values = dict(
             position=path.position @ table.T,
-            orientation=quaternion_product(base, path.orientation),
+            orientation=orientation,
             velocity=rates[:, :3] @ table.T,
-            angular_velocity=(R @ rates[:, 3:, None])[..., 0] @ table.T,
+            angular_velocity=rotated(orientation, rates[:, 3:]),
             wrench=guess.wrench,
             force=guess.force.reshape(horizon.steps, -1, horizon.controller.space.dim),
         )

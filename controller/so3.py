@@ -1,7 +1,8 @@
-"""Rotations as vectors, many at once: exponential, logarithm and the Jacobians that linearise them (Sola et al. 2018)."""
+"""Small turns: what linearises rotations, compiled, and turning by rotation vectors (Sola et al. 2018)."""
 
 import numpy as np
-from pivoting.controller.space import quaternion_product
+from pivoting.controller.kernel import kernel
+from pivoting.controller.space import rotation_error
 from pivoting.controller.validate import Array
 
 CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
@@ -14,51 +15,64 @@ def exponential(vector: Array) -> Array:
     return np.concatenate([np.cos(0.5 * angle), 0.5 * np.sinc(angle / (2.0 * np.pi)) * vector], axis=-1)
 
 
-def difference(start: Array, end: Array) -> Array:
-    """(..., 3) rotation vectors [rad], in the axes of the object, that turn orientations `start` into `end` (..., 4)."""
-    q = quaternion_product(start * CONJUGATE, end)
-    q = q * np.where(q[..., :1] < 0.0, -1.0, 1.0)
-    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
-    small = sine < 1e-12
-    scale = np.where(small, 2.0, 2.0 * np.arctan2(sine, q[..., :1]) / np.where(small, 1.0, sine))
-    return scale * q[..., 1:]
+def rotated(orientation: Array, points: Array) -> Array:
+    """(..., 3) points turned by unit quaternions (..., 4), shapes broadcast."""
+    w, axis = orientation[..., :1], orientation[..., 1:]
+    t = 2.0 * np.cross(axis, points)
+    return points + w * t + np.cross(axis, t)
 
 
-def turned(orientation: Array, vector: Array) -> Array:
-    """(..., 4) orientations turned by rotation vectors (..., 3) in the axes of the object, of unit length."""
-    q = quaternion_product(orientation, exponential(vector))
-    return q / np.linalg.norm(q, axis=-1, keepdims=True)
+@kernel
+def turn_by(orientation, vector):  # type: ignore[no-untyped-def]
+    """Turn quaternions (N, 4), in place, by rotation vectors (N, 3) in the object's own axes; unit length again."""
+    for i in range(orientation.shape[0]):
+        x, y, z = vector[i, 0], vector[i, 1], vector[i, 2]
+        angle = np.sqrt(x * x + y * y + z * z)
+        scale = 0.5 if angle < 1e-9 else np.sin(0.5 * angle) / angle
+        x, y, z, w = scale * x, scale * y, scale * z, np.cos(0.5 * angle)
+        a, b, c, d = orientation[i]
+        q0, q1 = a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y
+        q2, q3 = a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w
+        length = np.sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
+        orientation[i, 0], orientation[i, 1] = q0 / length, q1 / length
+        orientation[i, 2], orientation[i, 3] = q2 / length, q3 / length
 
 
-def matrices(q: Array) -> Array:
-    """(..., 3, 3) rotation matrices of unit quaternions (..., 4)."""
-    w, x, y, z = np.moveaxis(q, -1, 0)
-    rows = [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+@kernel
+def fill_differences(orientation, out):  # type: ignore[no-untyped-def]
+    """Write the rotation vectors (N, 3) [rad], in object axes, from each of (N+1, 4) orientations to the next."""
+    for i in range(out.shape[0]):
+        out[i, 0], out[i, 1], out[i, 2] = rotation_error(orientation[i], orientation[i + 1])
 
 
-def hat(v: Array) -> Array:
-    """(..., 3, 3) with hat(v) u = v x u."""
-    out = np.zeros((*v.shape, 3))
-    x, y, z = np.moveaxis(v, -1, 0)
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
-    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = z, -y, x
-    return out
+@kernel
+def fill_hat(x, y, z, out):  # type: ignore[no-untyped-def]
+    """Write the matrix (3, 3) with out u = (x, y, z) x u."""
+    out[0, 0] = out[1, 1] = out[2, 2] = 0.0
+    out[0, 1], out[0, 2], out[1, 2] = -z, y, -x
+    out[1, 0], out[2, 0], out[2, 1] = z, -y, x
 
 
-def difference_jacobians(vector: Array) -> tuple[Array, Array]:
-    """Of d = difference(start, end) (..., 3) by small turns of `end` and of `start`, in object axes: (..., 3, 3) each.
+@kernel
+def add_product(scale, A, B, out):  # type: ignore[no-untyped-def]
+    """out += scale A B, all (3, 3)."""
+    for i in range(3):
+        for j in range(3):
+            out[i, j] += scale * (A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j])
 
-    They are the inverses of SO(3)'s right Jacobian at d, and minus that of the left.
+
+@kernel
+def fill_difference_jacobians(v, end, start):  # type: ignore[no-untyped-def]
+    """Derivatives (3, 3) of v = rotation_error(q, q_d) by small turns of q_d (`end`) and of q (`start`), object axes.
+
+    The inverse of SO(3)'s right Jacobian at v, and minus that of the left.
     """
-    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
-    small = angle < _SMALL
-    safe = np.where(small, 1.0, angle)
-    quotient = np.where(small, 1.0 / 12.0, (1.0 - 0.5 * safe / np.tan(0.5 * safe)) / safe**2)
-    cross = hat(vector)
-    even = np.eye(3) + quotient * (cross @ cross)
-    return even + 0.5 * cross, -(even - 0.5 * cross)
+    x, y, z = v[0], v[1], v[2]
+    angle = np.sqrt(x * x + y * y + z * z)
+    k = 1.0 / 12.0 if angle < _SMALL else (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / (angle * angle)
+    fill_hat(0.5 * x, 0.5 * y, 0.5 * z, end)
+    for i in range(3):
+        for j in range(3):
+            even = k * v[i] * v[j] + (1.0 - k * angle * angle if i == j else 0.0)  # 1 + k v^ v^
+            start[i, j] = end[i, j] - even
+            end[i, j] += even

@@ -15,8 +15,9 @@ are y / h, so that they are no variables; omega is that of y_{t-1}, and c = 0 fo
 from typing import NamedTuple
 
 import numpy as np
-from pivoting.controller.controller import Belief
-from pivoting.controller.so3 import difference, difference_jacobians, hat, matrices
+from pivoting.controller.kernel import kernel
+from pivoting.controller.so3 import add_product, fill_difference_jacobians, fill_hat
+from pivoting.controller.space import cross, fill_rotation, into, rotation_error
 from pivoting.controller.validate import Array
 
 INTEGRATORS = {"quasi-dynamic": (1, 0), "implicit": (2, 0), "semi-implicit": (2, 1), "forward": (2, 2)}  # order, lag
@@ -26,94 +27,143 @@ class Path(NamedTuple):
     """Poses 0 to N, in table axes, and what came before them.
 
     position: (N+1, 3) CoM [m].  orientation: (N+1, 4) object axes to table.
-    before: (3,), (4,) the pose before pose 0, at which a forward step's forces act.
+    before: (7,) the pose at which a forward step's forces act first, position and orientation.
     arriving: (6,) y_0, h times the velocity with which pose 0 is reached.
     """
 
     position: Array
     orientation: Array
-    before: tuple[Array, Array]
+    before: Array
     arriving: Array
 
 
-class Linear(NamedTuple):
-    """constant + towards[0] d_t + towards[1] d_{t-1} + towards[2] d_{t-2} = wrench_gain w_t + force_gain f_t.
+class Mechanics(NamedTuple):
+    """What the compiled rows need to know; see `Belief`, but in table axes.
 
-    d: corrections of the poses, (nq,) each; zero for the given pose 0. In the rows' own units [N, N m].
-    constant: (N, nq).  towards: three of (N, nq, nq).  wrench_gain: (N, nq, nw).  force_gain: (N, nq, K d).
+    frames: (K, 3, d) contact axes as columns.  gravity: (3,).  pick, sign: (nw,) the components of 6 that are used.
+    """
+
+    mass: float
+    inertia: Array
+    points: Array
+    pivot: Array
+    frames: Array
+    gravity: Array
+    pick: Array
+    sign: Array
+
+
+class Motion(NamedTuple):
+    """towards[0] d_t + towards[1] d_{t-1} + towards[2] d_{t-2} + by_wrench w_t + by_force f_t + constant = 0.
+
+    d: corrections of the poses, (nq,) each; zero for the given pose 0. Rows in [N, N m].
+    constant: (N, nq).  towards: (3, N, nq, nq).  by_wrench: (N, nq, nw).  by_force: (N, nq, K d).
     """
 
     constant: Array
-    towards: tuple[Array, Array, Array]
-    wrench_gain: Array
-    force_gain: Array
+    towards: Array
+    by_wrench: Array
+    by_force: Array
 
 
-def linearised(
-    belief: Belief, frames: Array, gravity: Array, h: float, integrator: str, path: Path, wrench: Array, force: Array
-) -> Linear:
-    """The equations of motion to first order in poses, and exactly in wrench and force, about a path.
+def motion_rows(N: int, nq: int, n: int) -> Motion:
+    """Room for the equations of motion of N steps."""
+    return Motion(np.zeros((N, nq)), np.zeros((3, N, nq, nq)), np.zeros((N, nq, nq)), np.zeros((N, nq, n)))
+
+
+@kernel
+def fill_motion(body, order, lag, h, path, wrench, force, out):  # type: ignore[no-untyped-def]
+    """Write the equations of motion, to first order in poses and exactly in wrench and force, about a path.
 
     Args:
-        belief: what the controller believes; of it mass, inertia, points and maps are used.
-        frames: (K, 3, d) contact axes as columns, table axes.  gravity: (3,) table axes.
+        body: `Mechanics`.  order, lag: of the integrator.  h: [s].  path: `Path`.
         wrench: (N, nw), force: (N, K d): with which the forces' dependence on the pose is linearised; zero leaves it out.
+        out: `Motion`.
     """
-    order, lag = INTEGRATORS[integrator]
-    inertia, W, points = belief.inertia, belief.wrench_map, belief.points
-    N = len(wrench)
-    position, orientation = path.position, path.orientation
-    y, end, start = differences(path)
-    M = np.zeros((6, 6))
-    M[:3, :3], M[3:, 3:] = belief.mass * np.eye(3), inertia
-    acceleration = y[1:] - (order - 1) * y[:-1]
-    constant = acceleration @ M.T / h**2
-    by_end, by_start = M @ end / h**2, M @ start / h**2
-    towards = [by_end[1:].copy(), by_start[1:].copy(), np.zeros((N, 6, 6))]
-    if order == 2:
-        omega = y[:-1, 3:] / h
-        spin = omega @ inertia
-        constant[:, 3:] += np.cross(omega, spin)
-        gyro = np.zeros((N, 6, 6))
-        gyro[:, 3:, 3:] = (hat(omega) @ inertia - hat(spin)) / h
-        towards[1] += (gyro @ end[:-1]) - by_end[:-1]
-        towards[2] += (gyro @ start[:-1]) - by_start[:-1]
-    acts = np.concatenate([path.before[1][None], orientation])[2 - lag : 2 - lag + N] if lag else orientation[1:]
-    R = matrices(acts)
-    constant[:, :3] -= belief.mass * gravity
-    pushes = np.swapaxes(R, 1, 2)[:, None] @ frames  # (N, K, 3, d) contact axes in object axes
-    arms = hat(points)
-    gain = np.zeros((N, 6, 6))
-    gain[:, :3, :3], gain[:, 3:, 3:] = R, np.eye(3)
-    contact = np.concatenate([np.broadcast_to(frames, pushes.shape), arms @ pushes], axis=2)  # (N, K, 6, d)
-    contact = np.moveaxis(contact, 1, 2).reshape(N, 6, -1)
-    # R w turns by -R w^, R'g by (R'g)^: what the forces change as the pose does
-    K, d = len(points), frames.shape[-1]
-    turning = np.zeros((N, 6, 6))
-    turning[:, :3, 3:] = R @ hat((wrench @ W)[:, :3])
-    held = (pushes @ force.reshape(N, K, d, 1))[..., 0]
-    turning[:, 3:, 3:] = -(arms @ hat(held)).sum(axis=1)
-    towards[lag] += turning
-    return Linear(
-        constant @ W.T,
-        tuple(W @ block @ W.T for block in towards),  # type: ignore[arg-type]
-        W @ gain @ W.T,
-        W @ contact,
-    )
-
-
-def differences(path: Path) -> tuple[Array, Array, Array]:
-    """y_0 to y_N (N+1, 6), and their derivatives by the pose that is reached and the one before, (N+1, 6, 6) each.
-
-    Those of y_0, which is given, are zero.
-    """
-    count = len(path.position)
-    y = np.empty((count, 6))
-    y[0] = path.arriving
-    y[1:, :3] = np.diff(path.position, axis=0)
-    y[1:, 3:] = difference(path.orientation[:-1], path.orientation[1:])
-    end, start = np.zeros((count, 6, 6)), np.zeros((count, 6, 6))
-    end[1:, :3, :3] = np.eye(3)
-    start[1:, :3, :3] = -np.eye(3)
-    end[1:, 3:, 3:], start[1:, 3:, 3:] = difference_jacobians(y[1:, 3:])
-    return y, end, start
+    N, K, d = wrench.shape[0], body.points.shape[0], body.frames.shape[2]
+    nw = body.pick.shape[0]
+    R, hatted, turning = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    end, start, last_end, last_start = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
+    spin, gyro, gain = np.empty(3), np.empty((3, 3)), np.empty((6, 6))
+    y, last, rows, full = np.empty(6), path.arriving.copy(), np.empty(6), np.empty(6)
+    X = np.empty((3, 6, 6))
+    unit, light = body.mass / h**2, 1.0 / h**2
+    for t in range(N):
+        for i in range(3):
+            y[i] = path.position[t + 1, i] - path.position[t, i]
+        y[3], y[4], y[5] = rotation_error(path.orientation[t], path.orientation[t + 1])
+        fill_difference_jacobians(y[3:], end, start)
+        # inertia
+        X[:] = 0.0
+        for i in range(3):
+            X[0, i, i], X[1, i, i] = unit, -unit
+        add_product(light, body.inertia, end, X[0, 3:, 3:])
+        add_product(light, body.inertia, start, X[1, 3:, 3:])
+        for i in range(6):
+            full[i] = y[i] - (order - 1) * last[i]
+        for i in range(3):
+            rows[i] = unit * full[i] - body.mass * body.gravity[i]
+            rows[3 + i] = light * (
+                body.inertia[i, 0] * full[3] + body.inertia[i, 1] * full[4] + body.inertia[i, 2] * full[5]
+            )
+        if order == 2:
+            for i in range(3):
+                X[1, i, i] -= unit
+                X[2, i, i] += unit
+                spin[i] = (
+                    body.inertia[i, 0] * last[3] + body.inertia[i, 1] * last[4] + body.inertia[i, 2] * last[5]
+                ) / h
+            c0, c1, c2 = cross(last[3], last[4], last[5], spin[0], spin[1], spin[2])
+            rows[3] += c0 / h
+            rows[4] += c1 / h
+            rows[5] += c2 / h
+            # d(omega x I omega - I omega / h) by y_{t-1}
+            fill_hat(spin[0], spin[1], spin[2], gyro)
+            for i in range(3):
+                for j in range(3):
+                    gyro[i, j] = -gyro[i, j] / h - light * body.inertia[i, j]
+            fill_hat(last[3], last[4], last[5], hatted)
+            add_product(light, hatted, body.inertia, gyro)
+            add_product(1.0, gyro, last_end, X[1, 3:, 3:])
+            add_product(1.0, gyro, last_start, X[2, 3:, 3:])
+        # forces, at the pose where they act
+        if lag == 2 and t == 0:
+            fill_rotation(path.before[3:], R)
+        else:
+            fill_rotation(path.orientation[t + 1 - lag], R)
+        full[:] = 0.0
+        for i in range(nw):
+            full[body.pick[i]] = body.sign[i] * wrench[t, i]
+        fill_hat(full[0], full[1], full[2], hatted)
+        add_product(1.0, R, hatted, X[lag, :3, 3:])  # R w turns by -R w^
+        for k in range(K):
+            p0, p1, p2 = body.points[k, 0], body.points[k, 1], body.points[k, 2]
+            g0 = g1 = g2 = 0.0
+            for j in range(d):
+                a0, a1, a2 = body.frames[k, 0, j], body.frames[k, 1, j], body.frames[k, 2, j]
+                b0, b1, b2 = into(R, a0, a1, a2)
+                full[0], full[1], full[2] = a0, a1, a2
+                full[3], full[4], full[5] = cross(p0, p1, p2, b0, b1, b2)
+                for r in range(nw):
+                    out.by_force[t, r, d * k + j] = -body.sign[r] * full[body.pick[r]]
+                g0 += b0 * force[t, d * k + j]
+                g1 += b1 * force[t, d * k + j]
+                g2 += b2 * force[t, d * k + j]
+            fill_hat(g0, g1, g2, hatted)  # and R'g by (R'g)^
+            fill_hat(p0, p1, p2, turning)
+            add_product(-1.0, turning, hatted, X[lag, 3:, 3:])
+        gain[:] = 0.0
+        for i in range(3):
+            gain[3 + i, 3 + i] = 1.0
+            for j in range(3):
+                gain[i, j] = R[i, j]
+        for r in range(nw):
+            out.constant[t, r] = body.sign[r] * rows[body.pick[r]]
+            for c in range(nw):
+                s = body.sign[r] * body.sign[c]
+                out.by_wrench[t, r, c] = -s * gain[body.pick[r], body.pick[c]]
+                for k in range(3):
+                    out.towards[k, t, r, c] = s * X[k, body.pick[r], body.pick[c]]
+        last[:] = y
+        last_end[:] = end
+        last_start[:] = start
