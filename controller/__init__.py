@@ -7,10 +7,13 @@ from pivoting.controller.stale import drop_stale_kernels
 drop_stale_kernels(Path(__file__).parent)  # before any kernel is loaded
 
 # ruff: noqa: E402
+from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.conic import ClarabelWorkspace
 from pivoting.controller.contacts import Contact
 from pivoting.controller.controller import WrenchController
+from pivoting.controller.horizon import BodyState, Horizon
 from pivoting.controller.laws import Body, Law
+from pivoting.controller.plan import Plan, Planner
 from pivoting.controller.problem import WrenchProblem, wrench_weight
 from pivoting.controller.references import Constant, MinimumJerk, Reference, Sampled, Sine
 from pivoting.controller.solution import Solution, SolveError
@@ -19,17 +22,22 @@ from pivoting.controller.space import Motion
 
 __all__ = [
     "Body",
+    "BodyState",
     "ClarabelWorkspace",
     "Constant",
     "Contact",
+    "Horizon",
     "Law",
     "MinimumJerk",
     "Motion",
+    "Plan",
+    "Planner",
     "Reference",
     "Sampled",
     "Sine",
     "Solution",
     "SolveError",
+    "WrenchBounds",
     "WrenchController",
     "WrenchProblem",
     "methods",

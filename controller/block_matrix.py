@@ -11,7 +11,7 @@ Indices = NDArray[np.int64]
 
 
 class Part(NamedTuple):
-    """S equal blocks: rows (S, r) and columns (S, c) of each, mask (r, c) of the entries that may be other than zero."""
+    """S equal blocks: rows (S, r) and columns (S, c) of each, and the mask (r, c) of what may be other than zero."""
 
     rows: Indices
     columns: Indices

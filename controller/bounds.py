@@ -78,8 +78,11 @@ class WrenchBounds:
         """
         worst = -1.0
         for ball in self.balls(wrench.shape[-1]):
-            if ball.rate and before is None:
+            if not ball.rate:
+                change = wrench
+            elif before is not None:
+                change = (wrench - before) / dt
+            else:
                 continue
-            change = (wrench - before) / dt if ball.rate else wrench
             worst = max(worst, float(np.max(np.linalg.norm(change @ ball.rows.T, axis=-1))) / ball.radius - 1.0)
         return worst

@@ -7,8 +7,8 @@ t, wrench t, contact forces t), and rows of motion and sticking (equalities), ha
 from typing import NamedTuple
 
 import numpy as np
-from pivoting.controller.block_matrix import BlockMatrix, Part
-from pivoting.controller.conic_program import ConicProgram, Cones
+from pivoting.controller.block_matrix import BlockMatrix, Indices, Part
+from pivoting.controller.conic_program import Cones, ConicProgram
 from pivoting.controller.horizon import Horizon
 from pivoting.controller.horizon_rows import fill_clearance, fill_sticking, fill_tracking
 from pivoting.controller.limits import friction_limits, wrench_limits
@@ -67,7 +67,7 @@ class HorizonProgram:
         self._wide = 2 * nq + n
         pose, wrench, force = (np.arange(a, b) for a, b in ((0, nq), (nq, 2 * nq), (2 * nq, self._wide)))
 
-        def part(group: int, first: int, mask: Array, columns: Array, lag: int = 0) -> Part:
+        def part(group: int, first: int, mask: Array, columns: Indices, lag: int = 0) -> Part:
             """Rows from `first` on in their group, of every step, against columns of the step `lag` before."""
             steps = np.arange(lag, N)[:, None]
             rows = N * sum(tall[:group]) + tall[group] * steps + first + np.arange(len(mask))

@@ -3,10 +3,12 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.polygon import polygon
 from pivoting.controller.validate import Array
 
+Flags = NDArray[np.bool_]
 UNBOUNDED = 1e3  # of the weight: in place of a bound on the change from a wrench that is not known
 
 
@@ -18,10 +20,10 @@ class Limits(NamedTuple):
 
     linear: Array
     linear_side: Array
-    linear_rate: Array
+    linear_rate: Flags
     cone: Array
     cone_side: Array
-    cone_rate: Array
+    cone_rate: Flags
     orders: tuple[int, ...]
 
     def sides(self, steps: int, before: Array | None) -> tuple[Array, Array]:

@@ -25,9 +25,10 @@ class Plan:
         position: (N+1, 3) CoM [m], world axes.  orientation: (N+1, 4) object axes to world.
         velocity, angular_velocity: (N+1, 3) with which each pose is reached, world axes [m/s, rad/s].
         wrench: (N, nw) object axes [N, N m].  force: (N, K, d) contact axes [N]; step t leads to pose t + 1.
-        status: "solved", "not converged" (the last pass still changed more than `CONVERGED`), "infeasible" or "failed".
+        status: "solved", "not converged" (the last pass still changed more than asked), "infeasible" or "failed".
         said: by the solver.
-        passes: how many programs were solved.  changes: by how much each changed the guess, in weights, levers, radians.
+        passes: how many programs were solved.
+        changes: by how much each of them changed the guess, in weights, levers, radians.
         residual: relative KKT residual of the last program.
         motion_defect: of the equations of motion themselves, not linearised, over the weight.
         stick_defect: of the contacts staying put, over the lever; 0 if that was not asked.
@@ -147,14 +148,14 @@ class Planner:
         fill_differences(path.orientation, rates[1:, 3:])
         rates /= horizon.h
         orientation = quaternion_product(horizon.controller.base, path.orientation)
-        values = dict(
-            position=path.position @ table.T,
-            orientation=orientation,
-            velocity=rates[:, :3] @ table.T,
-            angular_velocity=rotated(orientation, rates[:, 3:]),
-            wrench=guess.wrench,
-            force=guess.force.reshape(horizon.steps, -1, horizon.controller.space.dim),
-        )
+        values = {
+            "position": path.position @ table.T,
+            "orientation": orientation,
+            "velocity": rates[:, :3] @ table.T,
+            "angular_velocity": rotated(orientation, rates[:, 3:]),
+            "wrench": guess.wrench,
+            "force": guess.force.reshape(horizon.steps, -1, horizon.controller.space.dim),
+        }
         for value in values.values():
             value.flags.writeable = False
         return Plan(horizon=horizon, guess=guess, **values, **said)  # type: ignore[arg-type]

@@ -15,6 +15,7 @@ are y / h, so that they are no variables; omega is that of y_{t-1}, and c = 0 fo
 from typing import NamedTuple
 
 import numpy as np
+from pivoting.controller.block_matrix import Indices
 from pivoting.controller.kernel import kernel
 from pivoting.controller.so3 import add_product, fill_difference_jacobians, fill_hat
 from pivoting.controller.space import cross, fill_rotation, into, rotation_error
@@ -49,7 +50,7 @@ class Mechanics(NamedTuple):
     pivot: Array
     frames: Array
     gravity: Array
-    pick: Array
+    pick: Indices
     sign: Array
 
 
@@ -77,7 +78,7 @@ def fill_motion(body, order, lag, h, path, wrench, force, out):  # type: ignore[
 
     Args:
         body: `Mechanics`.  order, lag: of the integrator.  h: [s].  path: `Path`.
-        wrench: (N, nw), force: (N, K d): with which the forces' dependence on the pose is linearised; zero leaves it out.
+        wrench, force: (N, nw), (N, K d), with which the forces' dependence on the pose is linearised; zero: it is not.
         out: `Motion`.
     """
     N, K, d = wrench.shape[0], body.points.shape[0], body.frames.shape[2]
