@@ -127,6 +127,13 @@ class WrenchController:
         """Scratch of the compiled loop, one for each thread."""
         return workspace(len(self.Q_w), len(self.contacts), self.space.dim)
 
+    def jacobian(self, orientation: Array) -> Array:
+        """(nw, K d) contact Jacobian in object axes at an orientation (4,), object axes to world."""
+        R, J, still = np.empty((3, 3)), np.empty((len(self.Q_w), len(self.Q_f))), np.zeros(3)
+        q = np.array(orientation)
+        _fill_problem(self.belief, q, still, q, still, still, R, J, np.empty(len(self.Q_w)))
+        return J
+
     def problem(self, state: Motion, desired: Motion | None = None) -> WrenchProblem:
         """The wrench problem, in object axes, at `state` (acceleration not used), reference at `desired`.
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from pivoting.controller.block_matrix import BlockMatrix, Indices, Part
 from pivoting.controller.conic_program import Cones, ConicProgram
+from pivoting.controller.contact_set import fixed_pairs
 from pivoting.controller.horizon import Horizon
 from pivoting.controller.horizon_rows import fill_clearance, fill_sticking, fill_tracking
 from pivoting.controller.limits import friction_limits, wrench_limits
@@ -54,7 +55,7 @@ class HorizonProgram:
         nq, n = len(belief.Q_w), len(belief.Q_f)
         lengths = np.array([1.0] * space.dim + [horizon.length] * (nq - space.dim))
         self._pose_unit, self._wrench_unit = horizon.length / lengths, horizon.unit * lengths
-        self._fixed = _fixed(belief.points, belief.pivot, belief.wrench_map, horizon.length)
+        self._fixed = fixed_pairs(belief.points, belief.pivot, belief.wrench_map)
         self._sticking = space.dim + len(self._fixed) if horizon.stick else 0
         self._friction = friction_limits(belief.mu, belief.f_min / horizon.unit, space.dim)
         self._bounds = wrench_limits(horizon.bounds, nq, horizon.edges, self._wrench_unit, horizon.h)
@@ -209,17 +210,3 @@ class HorizonProgram:
 
 def _repeated(block: Array, steps: int) -> Array:
     return np.broadcast_to(block, (steps, *block.shape))
-
-
-def _fixed(points: Array, pivot: Array, wrench_map: Array, length: float) -> Array:
-    """(D, 2, 3) pairs (u, e) of object axes: e, where it pointed at the start, does not turn towards u.
-
-    Contacts stay put if their mean does and, where they are on a line, that line does not turn; off a line, nothing
-    turns. Rows for every point would say the same several times over.
-    """
-    _, spread, (along, across, normal) = np.linalg.svd(points - pivot)
-    rank = min(2, int(np.count_nonzero(spread > 1e-9 * length)))
-    pairs = [[], [(across, along), (normal, along)], [(across, along), (normal, along), (normal, across)]][rank]
-    kept = np.array(pairs, dtype=float).reshape(-1, 2, 3)
-    moves = np.abs(np.cross(kept[:, 0], kept[:, 1]) @ wrench_map[:, 3:].T).max(axis=1, initial=0.0)
-    return kept[moves > 1e-9]

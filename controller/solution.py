@@ -8,7 +8,8 @@ from pivoting.controller.validate import Array
 
 TOLERANCE = 1e-7  # relative KKT residual; the closed form stays below 1e-11, interior points reach about 1e-9
 INSCRIBED = "inscribed"  # optimal for an inscribed pyramid, which is not the problem that was asked
-STATUS = ("solved", "inaccurate", "failed")  # indexed by the status codes of the compiled loop
+# Indexed by the status codes of a loop; "bounded": certified, but the bounds did not allow what was required.
+STATUS = ("solved", "inaccurate", "failed", "bounded")
 
 
 @dataclass(frozen=True, eq=False)

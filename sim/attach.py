@@ -30,14 +30,14 @@ class Attached:
     """A controller bound to a body of one model. `wrench` is all that a loop needs.
 
     Attributes:
-        body: what was read from the model.
+        model: the one it was read from.  body: what was read.
         controller: the `WrenchController` made from it.
     """
 
     def __init__(self, model: mujoco.MjModel, body: RigidBody, controller: WrenchController):
         self.body = body
         self.controller = controller
-        self._model = model
+        self.model = model
 
     def state(self, data: mujoco.MjData) -> Motion:
         """Orientation and rate of the body, from `data.qpos` and `data.qvel` as they are now.
@@ -46,13 +46,13 @@ class Attached:
         and the angular velocity (3,) in world axes. The kinematics of `data` are recomputed: after `mj_step` they
         describe the state one step back.
         """
-        if data.qpos.size != self._model.nq:
-            raise fail("data", f"MjData with {data.qpos.size} positions", f"of the attached model ({self._model.nq})")
+        if data.qpos.size != self.model.nq:
+            raise fail("data", f"MjData with {data.qpos.size} positions", f"of the attached model ({self.model.nq})")
         if not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
             raise ControlError("the state is not finite", data)
-        mujoco.mj_kinematics(self._model, data)
-        mujoco.mj_comPos(self._model, data)
-        mujoco.mj_comVel(self._model, data)
+        mujoco.mj_kinematics(self.model, data)
+        mujoco.mj_comPos(self.model, data)
+        mujoco.mj_comVel(self.model, data)
         q, omega = self._orientation(data), np.array(data.cvel[self.body.index, :3])
         if self.body.dim == 3:
             return Motion(q, omega)

@@ -8,20 +8,21 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
-from pivoting.controller.controller import WrenchController, step_worlds, world_wrench
+from pivoting.controller.controller import WrenchController, world_wrench
 from pivoting.controller.rotations import Turn
 from pivoting.controller.space import quaternion_product, space
 from pivoting.controller.validate import fail
 from pivoting.models.reading import RigidBody, matrix, place, read_friction, turn
 from pivoting.models.scenes import compiled, instrument, load
 from pivoting.sim.attach import Attached, attach
+from pivoting.sim.control import Answers, BoundedControl, Control, LawControl, States
 from pivoting.sim.fidelity import ContactRows, read_rows
 from pivoting.sim.plan import Plan, planned
+from pivoting.sim.planning import horizon_control
 from pivoting.sim.run import Run
 from pivoting.sim.scenario import CONTROL_KEYS, Scenario, scenario
 
 Array = NDArray[np.float64]
-TOLERANCE = 1e-9  # relative KKT residual of an answer that counts as solved
 START_DEPTH = 1e-6  # of the lever from contact to CoM: there is contact from the first step on
 MAX_STEPS = 10_000_000  # worlds times steps that are kept in memory, about 0.5 kB each
 
@@ -72,8 +73,9 @@ def simulate(
     if steps * dt <= case.limits.settle_s:
         raise fail("seconds", case.duration, f"more than the {case.limits.settle_s:g} s that the verdict lets settle")
     time: Array = dt * np.arange(steps + 1, dtype=float)
-    reference, desired = _desired(case, plan, time)
-    told = _desired(case, believed, time)[1]  # the controller knows only the table that it believes in
+    reference, desired, _ = _desired(case, plan, time)
+    # the controller knows only the table that it believes in
+    told, follow = _desired(case, believed, time)[1:]
     for values in (time, *reference, *desired):
         values.flags.writeable = False
 
@@ -84,7 +86,14 @@ def simulate(
     for values in start:
         values.flags.writeable = False
 
-    log = _loop(batch, attached.controller, truth, where, told, progress)
+    control: Control = LawControl(attached.controller, told)
+    horizons = None
+    if case.plan_hz is not None:
+        control = horizons = horizon_control(case, attached, believed, follow, int(worlds), dt, steps)
+    bounds = case.bounds()
+    if bounds.any:
+        control = BoundedControl(control, attached.controller, bounds, dt)
+    log = _loop(batch, control, attached.controller, truth, where, steps, progress)
     K, d = len(plan.contacts), truth.dim
     read = {key: log.sensors[..., columns] for key, columns in where.items()}
     forces = [read["contact"]] if K == 1 else [read[f"contact {i}"] for i in range(K)]
@@ -118,6 +127,8 @@ def simulate(
         status=_worlds_first(log.status),
         control_us=_worlds_first((log.control_ns / (1e3 * worlds))[:, None])[0],
         wall_s=log.wall_s,
+        plans=None if horizons is None else horizons.log,
+        events=() if horizons is None else tuple(horizons.events),
         controller="scenario" if controller is None else "given",
     )
 
@@ -168,8 +179,11 @@ def believe(case: Scenario, controller: WrenchController | None = None) -> tuple
     return attached, plan
 
 
-def _desired(case: Scenario, plan: Plan, time: Array) -> tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]]:
-    """The reference at every step, as angles and as orientations.
+Samples = tuple[Array, Array, Array]
+
+
+def _desired(case: Scenario, plan: Plan, time: Array) -> tuple[Samples, Samples, Turn]:
+    """The reference at every step, as angles and as orientations, and as what gives the latter at any time.
 
     Checked: whatever it says of itself, it has to keep the object on its contact.
     """
@@ -183,9 +197,9 @@ def _desired(case: Scenario, plan: Plan, time: Array) -> tuple[tuple[Array, Arra
     least, most = np.rad2deg(plan.range)
     if not least - 1e-9 <= low <= high <= most + 1e-9:
         raise fail("reference", f"angles from {low:g} to {high:g} deg", f"in [{least:.4g}, {most:.4g}] deg")
-    desired = Turn(case.motion, plan.axis, plan.start)(time)
-    q, omega, alpha = (np.array(values, dtype=float) for values in desired)
-    return (angle, rate, acceleration), (q, omega, alpha)
+    turn = Turn(case.motion, plan.axis, plan.start)
+    q, omega, alpha = (np.array(values, dtype=float) for values in turn(time))
+    return (angle, rate, acceleration), (q, omega, alpha), turn
 
 
 class _Log(NamedTuple):
@@ -210,19 +224,19 @@ def _worlds_first(values: NDArray[Any]) -> NDArray[Any]:
 
 def _loop(
     batch: Batch,
+    control: Control,
     controller: WrenchController,
     truth: RigidBody,
     where: dict[str, slice],
-    desired: tuple[Array, Array, Array],
+    steps: int,
     progress: Callable[[int, int], None] | None,
 ) -> _Log:
     """Step all worlds to the end."""
-    steps, worlds = len(desired[0]) - 1, batch.nsim
-    belief = controller.belief
+    worlds, belief = batch.nsim, controller.belief
     sensordata, xfrc = batch.bind("sensordata"), batch.bind("xfrc_applied")[:, truth.index]
     stage = int(mujoco.mjtStage.mjSTAGE_VEL)
     batch.forward(stage=stage)
-    q, omega = sensordata[:, where["quaternion"]], sensordata[:, where["angular_velocity"]]
+    states = States(*(sensordata[:, where[key]] for key in ("position", "quaternion", "velocity", "angular_velocity")))
     nw, n = belief.wrench_map.shape[0], belief.Q_f.shape[0]
     log = _Log(
         sensors=np.empty((steps + 1, *sensordata.shape)),
@@ -235,24 +249,17 @@ def _loop(
         wall_s=0.0,
     )
     sensors, wrench, wrench_world, force, residual, status, spent, _ = log
-    work = controller.workspace()
-    answers = (wrench, force, residual, status)
-
-    def control(k: int) -> None:
-        """State, solve and certify step k of every world."""
-        now, into = [values[k] for values in desired], [values[k] for values in answers]
-        step_worlds(belief, work, TOLERANCE, q, omega, *now, *into)
-
-    control(0)  # compiled before it is timed
-    world_wrench(belief.wrench_map, q, wrench[0], wrench_world[0])
+    control.prepare(states, Answers(wrench[0], force[0], residual[0], status[0]))  # compiled before it is timed
+    world_wrench(belief.wrench_map, states.orientation, wrench[0], wrench_world[0])
     sensors[0] = sensordata
     report = max(1, steps // 100)
     start = perf_counter()
     for k in range(steps):
         tick = perf_counter_ns()
-        control(k)
+        before = wrench[k - 1] if k else None
+        control(k, states, before, Answers(wrench[k], force[k], residual[k], status[k]))
         spent[k] = perf_counter_ns() - tick
-        world_wrench(belief.wrench_map, q, wrench[k], wrench_world[k])
+        world_wrench(belief.wrench_map, states.orientation, wrench[k], wrench_world[k])
         xfrc[:] = wrench_world[k]
         batch.step(stage=stage)
         sensors[k + 1] = sensordata

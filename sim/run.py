@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pivoting.controller.space import Space, quaternion_product, space
 from pivoting.models.reading import RigidBody, matrix
 from pivoting.sim.attach import Attached
+from pivoting.sim.control import Event, PlanLog
 from pivoting.sim.fidelity import ContactRows
 from pivoting.sim.monitor import Measures, measure
 from pivoting.sim.scenario import Scenario
@@ -54,6 +55,7 @@ class Run:
         residual: (W, N) relative KKT residuals.  status: (W, N) codes of `solution.STATUS`, 0 is solved.
         control_us: (N,) time to state, solve and certify the problem of one world [microseconds].
         wall_s: of the loop.
+        plans: of a receding horizon, what came of each; else None.  events: what a user has to know of.
         controller: "scenario" for the scenario's own, "given" for another that was handed to `simulate`.
     """
 
@@ -84,6 +86,8 @@ class Run:
     status: NDArray[np.int8]
     control_us: Array
     wall_s: float
+    plans: PlanLog | None
+    events: tuple[Event, ...]
     controller: str
 
     @property

@@ -8,17 +8,20 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.laws import FORMULATIONS, Law
 from pivoting.controller.problem import wrench_weight
 from pivoting.controller.references import Constant, MinimumJerk, Reference, Sine
+from pivoting.controller.transcription import INTEGRATORS
 from pivoting.controller.validate import Array, fail, number, one_of
 from pivoting.models.scenes import BODY, TABLE, WORLD_KEYS, scene_path
 from pivoting.sim.verdict import Limits
 
 HIDDEN_KEYS = ("mu", "mass", "size", "incline", "gravity")  # what the world may have and the controller not know
+BOUND_KEYS = ("force_max", "moment_max", "force_rate", "moment_rate")
 CONTROL_KEYS = ("law", "bandwidth", "damping", "margin", "f_min", "length")  # of the controller alone
 LOWEST = 0.1  # [deg] from a face: closer, the next corner touches the table too
-_OPTIONAL = ("length", *WORLD_KEYS)  # None: as the scene or the contact has it
+_OPTIONAL = ("length", "plan_hz", *BOUND_KEYS, *WORLD_KEYS)  # None: as the scene or the contact has it
 _POSITIVE = {"above": 0.0}
 _RANGES: dict[str, dict[str, Any]] = {
     "mu": {**_POSITIVE, "at_most": 10.0},
@@ -41,6 +44,14 @@ _RANGES: dict[str, dict[str, Any]] = {
     "margin": {"at_least": 0.0, "below": 1.0},
     "f_min": {"at_least": 0.0, "at_most": 1e9, "unit": "N"},
     "length": {**_POSITIVE, "at_most": 1e6, "unit": "m"},
+    "force_max": {**_POSITIVE, "at_most": 1e9, "unit": "N"},
+    "moment_max": {**_POSITIVE, "at_most": 1e9, "unit": "N m"},
+    "force_rate": {**_POSITIVE, "at_most": 1e12, "unit": "N/s"},
+    "moment_rate": {**_POSITIVE, "at_most": 1e12, "unit": "N m/s"},
+    "plan_hz": {**_POSITIVE, "at_most": 1e4, "unit": "Hz"},
+    "plan_steps": {"at_least": 1, "at_most": 1000},
+    "plan_step": {**_POSITIVE, "at_most": 10.0, "unit": "s"},
+    "track": {**_POSITIVE, "at_most": 1e12},
     "spread": {"at_least": 0.0, "at_most": 10.0, "unit": "deg"},
 }
 
@@ -68,6 +79,11 @@ class Scenario:
         law: "static", "quasi-dynamic", "dynamic".  bandwidth [rad/s], damping: of the dynamic law.
         margin: share of mu kept unused.  f_min: normal-force floor [N].
         length: characteristic length of Q_w [m]; None: the lever of the contact.
+        force_max [N], moment_max [N m], force_rate [N/s], moment_rate [N m/s]: bounds on the wrench, in object axes;
+            None: none.
+        plan_hz: how often a horizon is planned, which the per-step law then follows; None: the law follows the
+            reference itself.  plan_steps, plan_step [s], integrator: of the horizon, see `controller.Horizon`.
+        track: what a pose error of one radian, or one lever, costs in a plan's step, in squares of the weight.
         spread: each world starts off the reference by up to this angle [deg], drawn from the seed.
         limits: the thresholds of the verdict.
     """
@@ -93,6 +109,15 @@ class Scenario:
     margin: float = 1.0 / 6.0
     f_min: float = 0.0
     length: float | None = None
+    force_max: float | None = None
+    moment_max: float | None = None
+    force_rate: float | None = None
+    moment_rate: float | None = None
+    plan_hz: float | None = None
+    plan_steps: int = 20
+    plan_step: float = 0.02
+    integrator: str = "semi-implicit"
+    track: float = 1e4
     spread: float = 0.01
     mu: float | None = None
     mass: float | None = None
@@ -112,6 +137,9 @@ class Scenario:
         if isinstance(self.reference, str) or not callable(self.reference):
             one_of("reference", self.reference, ("constant", "arc", "return", "sine"))
         one_of("law", self.law, FORMULATIONS)
+        one_of("integrator", self.integrator, tuple(INTEGRATORS))
+        if self.plan_steps != int(self.plan_steps):
+            raise fail("plan_steps", self.plan_steps, "a whole number")
         if not isinstance(self.limits, Limits):
             raise fail("limits", self.limits, "Limits")
         one_of("about", self.about, ("tilt", "yaw"))
@@ -190,6 +218,12 @@ class Scenario:
             return Law.quasi_dynamic(1.0 / self.bandwidth)
         return Law.dynamic(self.bandwidth, self.damping)
 
+    def bounds(self) -> WrenchBounds:
+        """On the wrench; without any, one that bounds nothing."""
+        names = {"force_max": "force", "moment_max": "moment"}
+        given = {names.get(key, key): getattr(self, key) for key in BOUND_KEYS if getattr(self, key) is not None}
+        return WrenchBounds(**given)
+
     def wrench_weight(self, dim: int) -> Array | None:
         """Q_w of the characteristic length, or None for the controller's own."""
         return None if self.length is None else wrench_weight(dim, self.length)
@@ -217,7 +251,7 @@ class Scenario:
         return replace(self, **plain, world=world)
 
 
-_WORDS = ("reference", "law")
+_WORDS = ("reference", "law", "integrator")
 KEYS = (*_WORDS, *_RANGES)
 
 
@@ -309,6 +343,17 @@ SCENARIOS = {
             limits=Limits(slip_m=1e-4, angle_rms_deg=0.1, angle_max_deg=0.2, force_mismatch_rel=0.05, settle_s=0.1),
         ),
         Scenario(
+            "mpc-2d",
+            "10 to 80 deg in 1 s by a receding horizon, with a force of at most 0.8 of the weight",
+            scene="pivot-2d",
+            reference="arc",
+            theta=10.0,
+            seconds=1.0,
+            plan_hz=100.0,
+            force_max=8.0,
+            limits=Limits(slip_m=1e-4, angle_rms_deg=0.2, angle_max_deg=0.5, force_mismatch_rel=0.05, settle_s=0.1),
+        ),
+        Scenario(
             "balance-3d",
             "a 1 x 0.7 x 1.4 m block on one vertex, its body diagonal vertical, for 10 s",
             scene="balance-3d",
@@ -338,6 +383,18 @@ SCENARIOS = {
             theta=10.0,
             seconds=2.0,
             limits=_SPATIAL,
+        ),
+        Scenario(
+            "mpc-3d",
+            "the block about an edge by a receding horizon, from 10 to 80 deg in 2 s",
+            scene="pivot-3d",
+            contact="edge",
+            reference="arc",
+            theta=10.0,
+            seconds=2.0,
+            plan_hz=100.0,
+            force_max=8.0,
+            limits=Limits(slip_m=1e-4, angle_rms_deg=0.2, angle_max_deg=0.5, force_mismatch_rel=0.05, settle_s=0.1),
         ),
         Scenario(
             "settle-3d",

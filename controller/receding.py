@@ -1,0 +1,119 @@
+"""Receding horizon: plan again and again from where the object is, and what to follow between two plans."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from pivoting.controller.horizon import BodyState
+from pivoting.controller.horizon_program import Guess
+from pivoting.controller.plan import Plan, Planner
+from pivoting.controller.so3 import exponential
+from pivoting.controller.space import quaternion_product
+from pivoting.controller.transcription import INTEGRATORS
+from pivoting.controller.validate import Array, fail
+
+OUTCOMES = ("planned", "shifted", "holding")  # a plan; the last one shifted, as this one failed; none left to shift
+
+
+class Followed(NamedTuple):
+    """What is followed until the next plan.
+
+    Attributes:
+        plan: the last that succeeded, or None.
+        since: time since it was made [s].
+        outcome: of `OUTCOMES`.
+        attempt: the plan that was tried last, whatever came of it.
+    """
+
+    plan: Plan | None
+    since: float
+    outcome: str
+    attempt: Plan
+
+
+@dataclass(frozen=True, eq=False)
+class RecedingHorizon:
+    """Plans every `period` seconds; all that is remembered is what `replan` returns and is given back.
+
+    A plan that fails is replaced by the last one, shifted by the time that has passed; when that has run out, the
+    object is to stay as it is: the per-step law then holds it or, where the bounds do not allow that, lowers it as
+    gently as they do.
+
+    Attributes:
+        planner: of the horizon.  period: [s].
+        passes: programs solved for each plan; the next plan goes on from there.
+    """
+
+    planner: Planner
+    period: float
+    passes: int = 1
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.period <= self.planner.horizon.steps * self.planner.horizon.h:
+            raise fail("period", self.period, "> 0 and not longer than the horizon [s]")
+
+    def replan(
+        self, state: BodyState, orientations: Array, last: Followed | None, applied: Array | None = None
+    ) -> Followed:
+        """Plan from `state`, along orientations (N, 4) about the contacts where they are now.
+
+        Args:
+            last: what was followed until now; None at first.
+            applied: (nw,) wrench until now, for bounds on its rate.
+        """
+        horizon = self.planner.horizon
+        desired = horizon.arc(orientations, state)
+        guess, passes = None, 3 * self.passes
+        if last is not None and last.plan is not None and last.outcome == "planned":
+            shifted = _shifted(last.plan, (last.since + self.period) / horizon.h)
+            guess = shifted._replace(path=self.planner.guess(state, horizon.desired(*desired)).path)
+            passes = self.passes
+        attempt = self.planner.plan(state, desired, guess=guess, applied=applied, passes=passes)
+        if attempt.status in ("solved", "not converged"):
+            return Followed(attempt, 0.0, "planned", attempt)
+        if last is None or last.plan is None:
+            return Followed(None, 0.0, "holding", attempt)
+        since = last.since + self.period
+        if since + self.period > horizon.steps * horizon.h + 1e-9:
+            return Followed(None, 0.0, "holding", attempt)
+        return Followed(last.plan, since, "shifted", attempt)
+
+
+def _shifted(plan: Plan, steps: float) -> Guess:
+    """Wrenches and forces of a plan from `steps` on, the last ones repeated."""
+    N = len(plan.wrench)
+    index = np.minimum(np.arange(N) + round(steps), N - 1)
+    return plan.guess._replace(wrench=plan.guess.wrench[index], force=plan.guess.force[index])
+
+
+def followed_motion(followed: Followed, state: BodyState, times: Array) -> tuple[Array, Array, Array]:
+    """What to follow at `times` (T,) [s] after the last call of `replan`: (T, 4), (T, 3), (T, 3), world axes.
+
+    A plan's accelerations are constant over its steps, and integrated exactly here; its own poses are those of its
+    integrator. A quasi-dynamic plan has velocities and no accelerations. Holding means to stay where the object is.
+
+    Args:
+        state: that the last call of `replan` was given.
+    """
+    plan = followed.plan
+    if plan is None:
+        still = np.zeros((len(times), 3))
+        return np.tile(state.orientation, (len(times), 1)), still, still.copy()
+    h, N = plan.horizon.h, plan.horizon.steps
+    rates = plan.angular_velocity
+    if INTEGRATORS[plan.horizon.integrator][0] == 1:
+        rates = np.concatenate([rates[1:], rates[-1:]])
+        steps = np.zeros((N, 3))
+    else:
+        steps = np.diff(rates, axis=0) / h
+    begun = plan.guess.path.before[3:]
+    nodes = np.empty((N + 1, 4))
+    nodes[0] = quaternion_product(plan.horizon.controller.base, begun)
+    turns = rates[:-1] * h + 0.5 * steps * h**2  # world axes, each about an axis that hardly turns within a step
+    for t in range(N):
+        nodes[t + 1] = quaternion_product(exponential(turns[t]), nodes[t])
+    at = np.clip(followed.since + times, 0.0, N * h)
+    index = np.minimum((at / h + 1e-9).astype(int), N - 1)
+    tau = (at - index * h)[:, None]
+    turned = quaternion_product(exponential(rates[index] * tau + 0.5 * steps[index] * tau**2), nodes[index])
+    return turned, rates[index] + steps[index] * tau, steps[index]

@@ -1,0 +1,223 @@
+"""What decides on the wrenches of a step, for all worlds: a law on a reference, a receding horizon, a plan played."""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from pivoting.controller.bounded import BoundedSolver
+from pivoting.controller.bounds import WrenchBounds
+from pivoting.controller.controller import WrenchController, step_worlds
+from pivoting.controller.horizon import BodyState
+from pivoting.controller.receding import OUTCOMES, Followed, RecedingHorizon, followed_motion
+from pivoting.controller.rotations import Turn
+from pivoting.controller.solution import STATUS
+from pivoting.controller.transcription import INTEGRATORS
+
+Array = NDArray[np.float64]
+TOLERANCE = 1e-9  # relative KKT residual of an answer that counts as solved
+OVER = 1e-9  # of a bound: a wrench that exceeds it by more is solved for again, within bounds
+BOUNDED, FAILED = STATUS.index("bounded"), STATUS.index("failed")
+
+
+class States(NamedTuple):
+    """(W, 3), (W, 4), (W, 3), (W, 3): CoM, orientation and their velocities, world axes; the CoM's of the world."""
+
+    position: Array
+    orientation: Array
+    velocity: Array
+    angular_velocity: Array
+
+
+class Answers(NamedTuple):
+    """Where the answers of one step are written: wrench (W, nw), force (W, K d), residual (W,), status (W,)."""
+
+    wrench: Array
+    force: Array
+    residual: Array
+    status: NDArray[np.int8]
+
+
+class Control(Protocol):
+    """Writes the answers of step k."""
+
+    def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
+        """`before`: (W, nw) the wrenches of step k - 1, None at first."""
+        ...
+
+    def prepare(self, states: States, out: Answers) -> None:
+        """Do once what takes long, such as compiling; what is written does not count."""
+        ...
+
+
+class LawControl:
+    """The per-step law on a reference, the same for all worlds.
+
+    Args:
+        desired: (N+1, 4), (N+1, 3), (N+1, 3), the reference at every step.
+    """
+
+    def __init__(self, controller: WrenchController, desired: tuple[Array, Array, Array]):
+        self._belief, self._work, self._desired = controller.belief, controller.workspace(), desired
+
+    def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
+        now = [values[k] for values in self._desired]
+        step_worlds(self._belief, self._work, TOLERANCE, states.orientation, states.angular_velocity, *now, *out)
+
+    def prepare(self, states: States, out: Answers) -> None:
+        self(0, states, None, out)
+
+
+class BoundedControl:
+    """Another control within bounds: a wrench that exceeds one is solved for again, see `BoundedSolver`.
+
+    Args:
+        dt: time step [s].
+    """
+
+    def __init__(self, inner: Control, controller: WrenchController, bounds: WrenchBounds, dt: float):
+        self._inner, self._controller, self._bounds, self._dt = inner, controller, bounds, dt
+        self._solve = BoundedSolver(controller, bounds, dt)
+
+    def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
+        self._inner(k, states, before, out)
+        for i in range(len(out.wrench)):
+            last = None if before is None or not np.isfinite(before[i]).all() else before[i]
+            if not self._bounds.excess(out.wrench[i], last, self._dt) > OVER:
+                continue
+            jacobian = self._controller.jacobian(states.orientation[i])
+            answer = self._solve(jacobian, jacobian @ out.force[i] + out.wrench[i], last)
+            if not answer.residual <= 1e-6:
+                out.wrench[i], out.status[i] = np.nan, FAILED
+                continue
+            out.wrench[i], out.force[i], out.residual[i] = answer.wrench, answer.force.ravel(), answer.residual
+            if not answer.exact:
+                out.status[i] = BOUNDED
+
+    def prepare(self, states: States, out: Answers) -> None:
+        self._inner.prepare(states, out)
+        for _ in range(2):  # set up, then in place
+            jacobian = self._controller.jacobian(states.orientation[0])
+            self._solve(jacobian, jacobian @ out.force[0] + out.wrench[0])
+
+
+class PlanLog(NamedTuple):
+    """Of P plans in W worlds; entries that were never reached are nan.
+
+    step: (P,) at which they were made.  outcome: (W, P) indices of `receding.OUTCOMES`.
+    residual: (W, P) of the last program solved.  change: (W, P) by its last pass, in weights, levers and radians.
+    motion_defect, stick_defect: (W, P) of the equations themselves.  ms: (W, P) in all.
+    """
+
+    step: NDArray[np.int64]
+    outcome: NDArray[np.int8]
+    residual: Array
+    change: Array
+    motion_defect: Array
+    stick_defect: Array
+    ms: Array
+
+
+class Event(NamedTuple):
+    """Something that a user has to know of: in which world, when [s], what."""
+
+    world: int
+    time: float
+    what: str
+
+
+class HorizonControl:
+    """A receding horizon for each world; the per-step law follows its plans.
+
+    Args:
+        horizons: one for each world.
+        reference: of the orientation, as the controller believes it.
+        dt: time step [s].  every: steps from plan to plan.  steps: of the run.
+    """
+
+    def __init__(
+        self,
+        horizons: list[RecedingHorizon],
+        controller: WrenchController,
+        reference: Turn,
+        dt: float,
+        every: int,
+        steps: int,
+    ):
+        self._horizons, self._reference, self._dt, self._every = horizons, reference, dt, every
+        self._belief, self._work = controller.belief, controller.workspace()
+        W, P = len(horizons), -(-steps // every)
+        self._followed: list[Followed | None] = [None] * W
+        self._motions = np.empty((W, every, 4)), np.empty((W, every, 3)), np.empty((W, every, 3))
+        self.log = PlanLog(
+            every * np.arange(P), np.zeros((W, P), np.int8), *(np.full((W, P), np.nan) for _ in range(5))
+        )
+        self.events: list[Event] = []
+
+    def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
+        for i in range(len(out.wrench)):
+            if k % self._every == 0:
+                self._plan(i, k, states, before)
+            self._follow(i, k, states, out)
+
+    def prepare(self, states: States, out: Answers) -> None:
+        state = BodyState(*(np.array(values[0]) for values in states))
+        for _ in range(2):
+            self._horizons[0].replan(state, self._wanted(0), None)
+        self._motions[0][:], self._motions[1][:], self._motions[2][:] = state.orientation, 0.0, 0.0
+        self._follow(0, 0, states, out)
+
+    def _follow(self, i: int, k: int, states: States, out: Answers) -> None:
+        """The per-step law of world i."""
+        now = [values[i, k % self._every] for values in self._motions]
+        one = [values[i : i + 1] for values in (states.orientation, states.angular_velocity)]
+        step_worlds(self._belief, self._work, TOLERANCE, *one, *now, *(values[i : i + 1] for values in out))
+
+    def _wanted(self, k: int) -> Array:
+        """(N, 4) desired orientations over the horizon that begins at step k."""
+        horizon = self._horizons[0].planner.horizon
+        ahead = 1 + (INTEGRATORS[horizon.integrator][1] == 2) + np.arange(horizon.steps)
+        times: Array = k * self._dt + horizon.h * ahead.astype(float)
+        return np.asarray(self._reference(times).orientation)
+
+    def _plan(self, i: int, k: int, states: States, before: Array | None) -> None:
+        state = BodyState(*(np.array(values[i]) for values in states))
+        if not all(np.isfinite(values).all() for values in state):
+            return  # the world has diverged: its law will say so
+        applied = None if before is None or not np.isfinite(before[i]).all() else before[i]
+        last = self._followed[i]
+        now = self._horizons[i].replan(state, self._wanted(k), last, applied)
+        self._followed[i] = now
+        times: Array = self._dt * np.arange(self._every, dtype=float)
+        for values, motion in zip(self._motions, followed_motion(now, state, times), strict=True):
+            values[i] = motion
+        tried, p = now.attempt, k // self._every
+        self.log.outcome[i, p] = OUTCOMES.index(now.outcome)
+        change = tried.changes[-1] if tried.changes else np.nan
+        self.log.residual[i, p], self.log.change[i, p], self.log.ms[i, p] = tried.residual, change, 1e3 * tried.seconds
+        self.log.motion_defect[i, p], self.log.stick_defect[i, p] = tried.motion_defect, tried.stick_defect
+        if now.outcome != ("planned" if last is None else last.outcome):
+            why = f"plan {tried.status} ({tried.said}, KKT residual {tried.residual:.1g}): "
+            said = {
+                "planned": "planning again",
+                "shifted": why + "following the last plan",
+                "holding": why + "no plan to follow, holding or setting down within bounds",
+            }
+            self.events.append(Event(i, k * self._dt, said[now.outcome]))
+
+
+class PlayControl:
+    """Open loop: a plan's wrenches as they were planned, whatever the object does.
+
+    Args:
+        wrench: (N, nw) object axes, force: (N, K d), residual: one for all.
+    """
+
+    def __init__(self, wrench: Array, force: Array, residual: float):
+        self._wrench, self._force, self._residual = wrench, force, residual
+
+    def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
+        out.wrench[:], out.force[:] = self._wrench[k], self._force[k]
+        out.residual[:], out.status[:] = self._residual, 0
+
+    def prepare(self, states: States, out: Answers) -> None:
+        self(0, states, None, out)

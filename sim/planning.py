@@ -1,0 +1,76 @@
+"""The horizon of a scenario: what is planned for an object on its contacts, and how often."""
+
+import numpy as np
+from numpy.typing import NDArray
+from pivoting.controller.horizon import Horizon
+from pivoting.controller.plan import Planner
+from pivoting.controller.receding import RecedingHorizon
+from pivoting.controller.rotations import Turn
+from pivoting.controller.space import quaternion_product
+from pivoting.controller.validate import fail
+from pivoting.models.candidates import contact_points
+from pivoting.models.reading import matrix
+from pivoting.sim.attach import Attached
+from pivoting.sim.control import HorizonControl
+from pivoting.sim.plan import Plan
+from pivoting.sim.scenario import Scenario
+
+Array = NDArray[np.float64]
+NEAR = 0.02  # of the object's size: a corner that comes closer to the table within the contact's range is watched
+
+
+def horizon_control(
+    case: Scenario, attached: Attached, plan: Plan, reference: Turn, worlds: int, dt: float, steps: int
+) -> HorizonControl:
+    """The scenario's receding horizons, one for each world.
+
+    Args:
+        attached, plan: what the controller believes.  reference: of the orientation.
+        dt: time step [s].  steps: of the run.
+    """
+    assert case.plan_hz is not None
+    every = round(1.0 / (case.plan_hz * dt))
+    if every < 1 or every * dt > case.plan_steps * case.plan_step:
+        allowed = f"such that a plan is made every {dt:g} s (the time step) to {case.plan_steps * case.plan_step:g} s"
+        raise fail("plan_hz", case.plan_hz, allowed)
+    horizon = scenario_horizon(case, attached, plan)
+    horizons = [RecedingHorizon(Planner(horizon), every * dt) for _ in range(worlds)]
+    return HorizonControl(horizons, attached.controller, reference, dt, every, steps)
+
+
+def scenario_horizon(
+    case: Scenario, attached: Attached, plan: Plan, steps: int | None = None, h: float | None = None
+) -> Horizon:
+    """The scenario's horizon; `steps` and `h` [s] in place of its own."""
+    controller = attached.controller
+    unit = Horizon(controller, 1, 1.0)  # for its units
+    nq, dim = len(controller.Q_w), controller.space.dim
+    lengths = np.array([unit.length] * dim + [1.0] * (nq - dim))
+    return Horizon(
+        controller,
+        int(case.plan_steps) if steps is None else steps,
+        case.plan_step if h is None else h,
+        integrator=case.integrator,
+        Q=case.track * np.diag((unit.unit / lengths) ** 2),
+        bounds=case.bounds(),
+        stick=True,
+        clear=_watched(attached, plan),
+    )
+
+
+def _watched(attached: Attached, plan: Plan) -> Array:
+    """(P, 3) corners, from the CoM in object axes, that come down on the table at an end of the contact's range [m]."""
+    body, space = plan.body, attached.controller.space
+    corners = np.array([space.lift(body.point(corner)) for corner in contact_points(attached.model, body.index)])
+    contacts = np.array([space.lift(body.point(contact)) for contact in plan.contacts])
+    if not len(corners) or plan.axis @ matrix(body.table)[:, 2] > 0.5:  # turning about the table's normal, none does
+        return np.zeros((0, 3))
+    corners = np.unique(np.round(corners, 12), axis=0)
+    size = float(np.linalg.norm(np.ptp(corners, axis=0)))
+    up, watched = matrix(body.table)[:, 2], np.zeros(len(corners), dtype=bool)
+    for angle in plan.range:
+        turned = np.concatenate([[np.cos(0.5 * angle)], np.sin(0.5 * angle) * plan.axis])
+        R = matrix(quaternion_product(turned, plan.start))
+        watched |= (corners - contacts[0]) @ R.T @ up < NEAR * size
+    away = np.linalg.norm(corners[:, None] - contacts, axis=2).min(axis=1) > 1e-9 * size
+    return corners[watched & away]
