@@ -21,6 +21,7 @@ _CLARABEL = {
     "tol_gap_rel": 1e-10,
     "tol_feas": 1e-10,
     # what an update in place needs: the pattern that it was set up with
+    "max_threads": 1,
     "presolve_enable": False,
     "chordal_decomposition_enable": False,
     "input_sparse_dropzeros": False,

@@ -76,8 +76,8 @@ class Horizon:
     ):
         if not isinstance(controller, WrenchController):
             raise fail("controller", controller, "a WrenchController")
-        if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or not 1 <= steps <= 1000:
-            raise fail("steps", steps, "a whole number from 1 to 1000")
+        if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or not 1 <= steps <= 10_000:
+            raise fail("steps", steps, "a whole number from 1 to 10000")
         one_of("integrator", integrator, tuple(INTEGRATORS))
         if bounds is not None and not isinstance(bounds, WrenchBounds):
             raise fail("bounds", bounds, "WrenchBounds")

@@ -56,6 +56,18 @@ class Plan:
     guess: Guess = field(repr=False)
 
 
+class PlanError(RuntimeError):
+    """No plan. Carries the `plan` that was refused, with its status and residual."""
+
+    def __init__(self, plan: Plan):
+        self.plan = plan
+        last = f"its last change was {plan.changes[-1]:.2g}" if plan.changes else "nothing was solved"
+        super().__init__(
+            f"plan: {plan.status} after {plan.passes} passes, {last}, KKT residual {plan.residual:.3g}; "
+            f"the solver said: {plan.said}"
+        )
+
+
 class Planner:
     """Plans for one horizon, with a solver whose structure is kept from plan to plan.
 

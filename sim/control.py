@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from pivoting.controller.bounded import BoundedSolver
 from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.controller import WrenchController, step_worlds
-from pivoting.controller.horizon import BodyState
+from pivoting.controller.horizon import BodyState, Horizon
+from pivoting.controller.plan import Plan, PlanError, Planner
 from pivoting.controller.receding import OUTCOMES, Followed, RecedingHorizon, followed_motion
 from pivoting.controller.rotations import Turn
 from pivoting.controller.solution import STATUS
@@ -125,6 +126,12 @@ class Event(NamedTuple):
     what: str
 
 
+def plan_times(horizon: Horizon) -> Array:
+    """(N,) after how long a horizon's poses are reached [s]."""
+    first = 2 if INTEGRATORS[horizon.integrator][1] == 2 else 1
+    return horizon.h * np.arange(first, first + horizon.steps, dtype=float)
+
+
 class HorizonControl:
     """A receding horizon for each world; the per-step law follows its plans.
 
@@ -174,9 +181,7 @@ class HorizonControl:
 
     def _wanted(self, k: int) -> Array:
         """(N, 4) desired orientations over the horizon that begins at step k."""
-        horizon = self._horizons[0].planner.horizon
-        ahead = 1 + (INTEGRATORS[horizon.integrator][1] == 2) + np.arange(horizon.steps)
-        times: Array = k * self._dt + horizon.h * ahead.astype(float)
+        times = k * self._dt + plan_times(self._horizons[0].planner.horizon)
         return np.asarray(self._reference(times).orientation)
 
     def _plan(self, i: int, k: int, states: States, before: Array | None) -> None:
@@ -206,18 +211,33 @@ class HorizonControl:
 
 
 class PlayControl:
-    """Open loop: a plan's wrenches as they were planned, whatever the object does.
+    """Open loop: one plan of the whole motion, its wrenches applied in object axes whatever the object does.
 
     Args:
-        wrench: (N, nw) object axes, force: (N, K d), residual: one for all.
+        planner: of as many steps as the run has, `per` time steps each.
+        reference: of the orientation, as the controller believes it.
     """
 
-    def __init__(self, wrench: Array, force: Array, residual: float):
-        self._wrench, self._force, self._residual = wrench, force, residual
-
-    def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
-        out.wrench[:], out.force[:] = self._wrench[k], self._force[k]
-        out.residual[:], out.status[:] = self._residual, 0
+    def __init__(self, planner: Planner, reference: Turn, per: int):
+        self._planner, self._reference, self._per = planner, reference, per
+        self.plan: Plan | None = None
 
     def prepare(self, states: States, out: Answers) -> None:
-        self(0, states, None, out)
+        """Plan from the state of the first world.
+
+        Raises:
+            PlanError: there is no plan.
+        """
+        horizon = self._planner.horizon
+        state = BodyState(*(np.array(values[0]) for values in states))
+        wanted = np.asarray(self._reference(plan_times(horizon)).orientation)
+        plan = self._planner.plan(state, horizon.arc(wanted, state))
+        if plan.status != "solved":
+            raise PlanError(plan)
+        self.plan = plan
+
+    def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
+        assert self.plan is not None
+        t = k // self._per
+        out.wrench[:], out.force[:] = self.plan.wrench[t], self.plan.force[t].ravel()
+        out.residual[:], out.status[:] = self.plan.residual, 0

@@ -18,7 +18,7 @@ from pivoting.sim.attach import Attached, attach
 from pivoting.sim.control import Answers, BoundedControl, Control, LawControl, States
 from pivoting.sim.fidelity import ContactRows, read_rows
 from pivoting.sim.plan import Plan, planned
-from pivoting.sim.planning import horizon_control
+from pivoting.sim.planning import horizon_control, play_control
 from pivoting.sim.run import Run
 from pivoting.sim.scenario import CONTROL_KEYS, Scenario, scenario
 
@@ -34,6 +34,7 @@ def simulate(
     *,
     controller: WrenchController | None = None,
     progress: Callable[[int, int], None] | None = None,
+    open_loop: bool = False,
     **overrides: Any,
 ) -> Run:
     """Run a scenario in closed loop in MuJoCo and measure it.
@@ -45,10 +46,13 @@ def simulate(
         seed: same seed, same arrays, bit for bit.
         controller: to be tested in place of the scenario's own, which is built from what the scenario believes.
         progress: called with (steps done, steps) about a hundred times.
+        open_loop: plan the whole motion once, in steps of the scenario's `plan_step`, and apply those wrenches whatever
+            happens: the run's `plan` is then to be compared with what MuJoCo makes of it.
         overrides: keys of the scenario; `world={"mu": 0.2}` or `**{"world.mu": 0.2}` changes the world alone.
 
     Raises:
         ValueError: an unknown scenario or key, or a value out of range; it is named.
+        PlanError: open loop, and there is no plan.
     """
     if not isinstance(name, str | Scenario):
         raise fail("scenario", name, "a name or a Scenario")
@@ -87,11 +91,13 @@ def simulate(
         values.flags.writeable = False
 
     control: Control = LawControl(attached.controller, told)
-    horizons = None
-    if case.plan_hz is not None:
+    horizons = played = None
+    if open_loop:
+        control = played = play_control(case, attached, believed, follow, dt, steps)
+    elif case.plan_hz is not None:
         control = horizons = horizon_control(case, attached, believed, follow, int(worlds), dt, steps)
     bounds = case.bounds()
-    if bounds.any:
+    if bounds.any and not open_loop:  # a plan is within them
         control = BoundedControl(control, attached.controller, bounds, dt)
     log = _loop(batch, control, attached.controller, truth, where, steps, progress)
     K, d = len(plan.contacts), truth.dim
@@ -127,6 +133,7 @@ def simulate(
         status=_worlds_first(log.status),
         control_us=_worlds_first((log.control_ns / (1e3 * worlds))[:, None])[0],
         wall_s=log.wall_s,
+        plan=None if played is None else played.plan,
         plans=None if horizons is None else horizons.log,
         events=() if horizons is None else tuple(horizons.events),
         controller="scenario" if controller is None else "given",

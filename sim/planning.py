@@ -11,7 +11,7 @@ from pivoting.controller.validate import fail
 from pivoting.models.candidates import contact_points
 from pivoting.models.reading import matrix
 from pivoting.sim.attach import Attached
-from pivoting.sim.control import HorizonControl
+from pivoting.sim.control import HorizonControl, PlayControl
 from pivoting.sim.plan import Plan
 from pivoting.sim.scenario import Scenario
 
@@ -38,10 +38,17 @@ def horizon_control(
     return HorizonControl(horizons, attached.controller, reference, dt, every, steps)
 
 
-def scenario_horizon(
-    case: Scenario, attached: Attached, plan: Plan, steps: int | None = None, h: float | None = None
-) -> Horizon:
-    """The scenario's horizon; `steps` and `h` [s] in place of its own."""
+def play_control(case: Scenario, attached: Attached, plan: Plan, reference: Turn, dt: float, steps: int) -> PlayControl:
+    """The scenario's whole motion as one plan that is played; see `horizon_control`."""
+    per = round(case.plan_step / dt)
+    if per < 1 or abs(per * dt - case.plan_step) > 1e-9:
+        raise fail("plan_step", case.plan_step, f"a whole number of time steps of {dt:g} s, in open loop")
+    horizon = scenario_horizon(case, attached, plan, steps=-(-steps // per))
+    return PlayControl(Planner(horizon), reference, per)
+
+
+def scenario_horizon(case: Scenario, attached: Attached, plan: Plan, steps: int | None = None) -> Horizon:
+    """The scenario's horizon; `steps` in place of its own."""
     controller = attached.controller
     unit = Horizon(controller, 1, 1.0)  # for its units
     nq, dim = len(controller.Q_w), controller.space.dim
@@ -49,7 +56,7 @@ def scenario_horizon(
     return Horizon(
         controller,
         int(case.plan_steps) if steps is None else steps,
-        case.plan_step if h is None else h,
+        case.plan_step,
         integrator=case.integrator,
         Q=case.track * np.diag((unit.unit / lengths) ** 2),
         bounds=case.bounds(),

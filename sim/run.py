@@ -7,6 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.controller.plan import Plan
 from pivoting.controller.space import Space, quaternion_product, space
 from pivoting.models.reading import RigidBody, matrix
 from pivoting.sim.attach import Attached
@@ -55,6 +56,7 @@ class Run:
         residual: (W, N) relative KKT residuals.  status: (W, N) codes of `solution.STATUS`, 0 is solved.
         control_us: (N,) time to state, solve and certify the problem of one world [microseconds].
         wall_s: of the loop.
+        plan: that was played in open loop, else None.
         plans: of a receding horizon, what came of each; else None.  events: what a user has to know of.
         controller: "scenario" for the scenario's own, "given" for another that was handed to `simulate`.
     """
@@ -86,6 +88,7 @@ class Run:
     status: NDArray[np.int8]
     control_us: Array
     wall_s: float
+    plan: Plan | None
     plans: PlanLog | None
     events: tuple[Event, ...]
     controller: str
