@@ -153,6 +153,7 @@ class _Split:
         self._entries = [part.data.astype(np.int64) - 1 for part in self._matrices]
 
     def fits(self, program: ConicProgram) -> bool:
+        """Whether a program has this pattern."""
         given = [program.P.indptr, program.P.indices, program.A.indptr, program.A.indices]
         return all(a is b or np.array_equal(a, b) for a, b in zip(self._pattern, given, strict=True))
 

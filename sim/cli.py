@@ -92,6 +92,7 @@ def list_scenarios() -> int:
 )
 @click.option("--support", help="Name of the plane or box geom that it stands on; by default the only plane.")
 @click.option("--as-modelled", is_flag=True, help="Keep the file's contact and solver parameters.")
+@click.option("--open-loop", is_flag=True, help="Plan the whole motion once and apply that, whatever happens.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for SCENARIO.rrd and summary.json.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object and nothing else.")
 def run(
@@ -99,6 +100,7 @@ def run(
     worlds: int,
     seed: int,
     settings: tuple[str, ...],
+    open_loop: bool,
     out: Path | None,
     as_json: bool,
     **own: Any,
@@ -117,7 +119,7 @@ def run(
     if out is not None:
         _make_folder(out)
     with _progress(f"{scenario}, {worlds} world{'s' * (worlds > 1)}") as report:
-        finished = simulate(case, worlds, seed, progress=report)
+        finished = simulate(case, worlds, seed, progress=report, open_loop=open_loop)
 
     from pivoting.sim.report import jsonable, print_run
     from rich.console import Console
@@ -152,6 +154,9 @@ def main() -> None:
         code = _refuse(error.format_message())
     except (ValueError, OSError) as error:
         code = _refuse(str(error))
+    except RuntimeError as error:  # no certified answer: the run ends without a verdict
+        click.echo(f"pivoting: {error}", err=True)
+        code = 1
     except click.Abort:
         click.echo("pivoting: interrupted", err=True)
         code = 130

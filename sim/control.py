@@ -65,6 +65,7 @@ class LawControl:
         step_worlds(self._belief, self._work, TOLERANCE, states.orientation, states.angular_velocity, *now, *out)
 
     def prepare(self, states: States, out: Answers) -> None:
+        """Compile."""
         self(0, states, None, out)
 
 
@@ -95,6 +96,7 @@ class BoundedControl:
                 out.status[i] = BOUNDED
 
     def prepare(self, states: States, out: Answers) -> None:
+        """Compile, and set the solver up."""
         self._inner.prepare(states, out)
         for _ in range(2):  # set up, then in place
             jacobian = self._controller.jacobian(states.orientation[0])
@@ -116,6 +118,20 @@ class PlanLog(NamedTuple):
     motion_defect: Array
     stick_defect: Array
     ms: Array
+
+
+def plan_figures(log: PlanLog) -> dict[str, float]:
+    """What a run's summary says of its plans: how many, how many failed, the worst of their certificates, time."""
+    made = log.outcome == 0
+    return {
+        "plans": float(log.outcome.size),
+        "plans_failed": float(np.count_nonzero(log.outcome != 0)),
+        "plan_residual_max": float(np.max(np.nan_to_num(log.residual, nan=np.inf)[made], initial=0.0)),
+        "plan_change_max": float(np.max(log.change[made], initial=0.0)),
+        "plan_motion_defect_max": float(np.max(log.motion_defect[made], initial=0.0)),
+        "plan_ms_median": float(np.nanmedian(log.ms)),
+        "plan_ms_p99": float(np.nanquantile(log.ms, 0.99)),
+    }
 
 
 class Event(NamedTuple):
@@ -167,6 +183,7 @@ class HorizonControl:
             self._follow(i, k, states, out)
 
     def prepare(self, states: States, out: Answers) -> None:
+        """Compile, and set the first world's solver up."""
         state = BodyState(*(np.array(values[0]) for values in states))
         for _ in range(2):
             self._horizons[0].replan(state, self._wanted(0), None)

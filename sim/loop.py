@@ -17,10 +17,11 @@ from pivoting.models.scenes import compiled, instrument, load
 from pivoting.sim.attach import Attached, attach
 from pivoting.sim.control import Answers, BoundedControl, Control, LawControl, States
 from pivoting.sim.fidelity import ContactRows, read_rows
+from pivoting.sim.keys import CONTROL_KEYS
 from pivoting.sim.plan import Plan, planned
 from pivoting.sim.planning import horizon_control, play_control
 from pivoting.sim.run import Run
-from pivoting.sim.scenario import CONTROL_KEYS, Scenario, scenario
+from pivoting.sim.scenario import Scenario, scenario
 
 Array = NDArray[np.float64]
 START_DEPTH = 1e-6  # of the lever from contact to CoM: there is contact from the first step on

@@ -5,12 +5,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.controller.solution import STATUS
 from pivoting.sim.fidelity import drift
 
 if TYPE_CHECKING:
     from pivoting.sim.run import Run
 
 Array = NDArray[np.float64]
+BOUNDED = STATUS.index("bounded")
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +29,7 @@ class Measures:
         friction_use_max: measured |f_t| / (mu f_n) with the world's mu; nan if there never was a push.
         force_mismatch_rel: RMS of measured minus predicted contact force over RMS of the predicted.
         residual_max: greatest KKT residual; inf where a step had no answer.
-        unsolved_steps: steps without an answer within tolerance.
+        unsolved_steps: steps without an answer within tolerance; within bounds is one.
     """
 
     slip_max_m: Array
@@ -68,7 +70,7 @@ def measure(run: "Run") -> Measures:
         friction_use_max=np.where(ever, np.where(pushed, use, 0.0).max(axis=(1, 2)), np.nan),
         force_mismatch_rel=mismatch,
         residual_max=np.where(np.isfinite(run.residual), run.residual, np.inf).max(axis=1),
-        unsolved_steps=np.count_nonzero(run.status != 0, axis=1).astype(float),
+        unsolved_steps=np.count_nonzero((run.status != 0) & (run.status != BOUNDED), axis=1).astype(float),
     )
 
 

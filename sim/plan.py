@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from pivoting.controller.space import quaternion_product
 from pivoting.models.candidates import contact_points, stance, support_points
 from pivoting.models.reading import ModelError, RigidBody, matrix, quaternion, read_body
-from pivoting.sim.scenario import LOWEST, Scenario
+from pivoting.sim.keys import LOWEST
+from pivoting.sim.scenario import Scenario
 
 Array = NDArray[np.float64]
 

@@ -10,6 +10,8 @@ from pivoting.sim.scenario import SCENARIOS
 from rich.console import Console
 from rich.table import Table
 
+_EVENTS = 5  # that people are shown
+
 # name in the summary: (what people read, factor, unit)
 _LINES = {
     "slip_max_m": ("slip of the contact", 1e3, "mm"),
@@ -54,6 +56,27 @@ def print_run(console: Console, run: Run) -> None:
         f" {summary['solve_us_median']:.1f} us a step (99th percentile {summary['solve_us_p99']:.1f})",
         soft_wrap=True,
     )
+    if "plans" in summary:
+        console.print(
+            f"{summary['plans']:.0f} plans, {summary['plans_failed']:.0f} failed;"
+            f" {summary['plan_ms_median']:.2f} ms each (99th percentile {summary['plan_ms_p99']:.2f});"
+            f" greatest KKT residual {_short(summary['plan_residual_max'])};"
+            f" {summary['real_time_factor']:.1f} times real time",
+            soft_wrap=True,
+        )
+    if run.plan is not None:
+        console.print(
+            f"open loop: a plan of {run.plan.horizon.steps} steps ({run.plan.passes} passes, {run.plan.seconds:.2f} s);"
+            f" the object is at most {_short(summary['plan_angle_error_max_deg'])} deg off it",
+            soft_wrap=True,
+        )
+    if summary["bounded_steps"]:
+        told = f"{summary['bounded_steps']} of {run.status.size} steps: the bounds did not allow what was asked for"
+        console.print(told, style="yellow", soft_wrap=True)
+    for event in run.events[:_EVENTS]:
+        console.print(f"world {event.world}, {event.time:.3f} s: {event.what}", style="yellow", soft_wrap=True)
+    if len(run.events) > _EVENTS:
+        console.print(f"and {len(run.events) - _EVENTS} more events, all in summary.json", style="yellow")
 
 
 def print_scenarios(console: Console) -> None:

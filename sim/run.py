@@ -11,7 +11,7 @@ from pivoting.controller.plan import Plan
 from pivoting.controller.space import Space, quaternion_product, space
 from pivoting.models.reading import RigidBody, matrix
 from pivoting.sim.attach import Attached
-from pivoting.sim.control import Event, PlanLog
+from pivoting.sim.control import BOUNDED, Event, PlanLog, plan_figures, plan_times
 from pivoting.sim.fidelity import ContactRows
 from pivoting.sim.monitor import Measures, measure
 from pivoting.sim.scenario import Scenario
@@ -53,7 +53,8 @@ class Run:
         force: (W, N, K, d) contact forces (f_t, f_n) or (f_t, f_o, f_n) predicted by the solution, table axes [N].
         force_measured: (W, N, K, d) by MuJoCo's contact sensors, likewise.
         contacts_found: (W, N) contacts between the body and its support, as MuJoCo counts them.
-        residual: (W, N) relative KKT residuals.  status: (W, N) codes of `solution.STATUS`, 0 is solved.
+        residual: (W, N) relative KKT residuals.
+        status: (W, N) codes of `solution.STATUS`; 0 is solved, 3 as far as the bounds allowed.
         control_us: (N,) time to state, solve and certify the problem of one world [microseconds].
         wall_s: of the loop.
         plan: that was played in open loop, else None.
@@ -218,4 +219,24 @@ class Run:
             "solve_us_p99": float(np.quantile(self.control_us, 0.99)),
             "sim_s": float(self.time[-1]),
             "wall_s": self.wall_s,
+            "real_time_factor": self.worlds * float(self.time[-1]) / self.wall_s,
+            "bounded_steps": int(np.count_nonzero(self.status == BOUNDED)),
+            "events": [event._asdict() for event in self.events],
+            **({} if self.plans is None else plan_figures(self.plans)),
+            **({} if self.plan is None else {"plan_angle_error_max_deg": float(np.rad2deg(self.plan_error.max()))}),
         }
+
+    @cached_property
+    def plan_error(self) -> Array:
+        """(W, P) angle [rad] between the object and the plan played in open loop, at the P poses that it has.
+
+        Raises:
+            ValueError: the run was not in open loop.
+        """
+        if self.plan is None:
+            raise ValueError("run: was in closed loop; must be of simulate(..., open_loop=True)")
+        times = np.concatenate([[0.0], plan_times(self.plan.horizon)])
+        kept = times <= self.time[-1] + 1e-9
+        steps = np.round(times[kept] / self.dt).astype(int)
+        turned = quaternion_product(self.quaternion[:, steps], self.plan.orientation[kept] * INVERSE)
+        return _frozen(2.0 * np.arctan2(np.linalg.norm(turned[..., 1:], axis=-1), np.abs(turned[..., 0])))

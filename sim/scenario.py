@@ -15,45 +15,8 @@ from pivoting.controller.references import Constant, MinimumJerk, Reference, Sin
 from pivoting.controller.transcription import INTEGRATORS
 from pivoting.controller.validate import Array, fail, number, one_of
 from pivoting.models.scenes import BODY, TABLE, WORLD_KEYS, scene_path
+from pivoting.sim.keys import BOUND_KEYS, HIDDEN_KEYS, KEYS, LOWEST, OPTIONAL, RANGES, parsed
 from pivoting.sim.verdict import Limits
-
-HIDDEN_KEYS = ("mu", "mass", "size", "incline", "gravity")  # what the world may have and the controller not know
-BOUND_KEYS = ("force_max", "moment_max", "force_rate", "moment_rate")
-CONTROL_KEYS = ("law", "bandwidth", "damping", "margin", "f_min", "length")  # of the controller alone
-LOWEST = 0.1  # [deg] from a face: closer, the next corner touches the table too
-_OPTIONAL = ("length", "plan_hz", *BOUND_KEYS, *WORLD_KEYS)  # None: as the scene or the contact has it
-_POSITIVE = {"above": 0.0}
-_RANGES: dict[str, dict[str, Any]] = {
-    "mu": {**_POSITIVE, "at_most": 10.0},
-    "mass": {**_POSITIVE, "at_most": 1e6, "unit": "kg"},
-    "size": {**_POSITIVE, "at_most": 1e3, "unit": "m"},
-    "incline": {"above": -90.0, "below": 90.0, "unit": "deg"},
-    "gravity": {"at_least": 0.0, "at_most": 1e3, "unit": "m/s^2"},
-    "dt": {**_POSITIVE, "at_most": 0.1, "unit": "s"},
-    "timeconst": {**_POSITIVE, "at_most": 1.0, "unit": "s"},
-    "impedance": {**_POSITIVE, "below": 1.0},
-    "impratio": {**_POSITIVE, "at_most": 1e9},
-    "theta": {"at_least": LOWEST, "at_most": 90.0 - LOWEST, "unit": "deg"},
-    "theta_end": {"at_least": LOWEST, "at_most": 90.0 - LOWEST, "unit": "deg"},
-    "seconds": {**_POSITIVE, "at_most": 3600.0, "unit": "s"},
-    "hold": {"at_least": 0.0, "at_most": 3600.0, "unit": "s"},
-    "amplitude": {"at_least": 0.0, "below": 45.0, "unit": "deg"},
-    "period": {**_POSITIVE, "at_most": 3600.0, "unit": "s"},
-    "bandwidth": {**_POSITIVE, "at_most": 1e5, "unit": "rad/s"},
-    "damping": {**_POSITIVE, "at_most": 100.0},
-    "margin": {"at_least": 0.0, "below": 1.0},
-    "f_min": {"at_least": 0.0, "at_most": 1e9, "unit": "N"},
-    "length": {**_POSITIVE, "at_most": 1e6, "unit": "m"},
-    "force_max": {**_POSITIVE, "at_most": 1e9, "unit": "N"},
-    "moment_max": {**_POSITIVE, "at_most": 1e9, "unit": "N m"},
-    "force_rate": {**_POSITIVE, "at_most": 1e12, "unit": "N/s"},
-    "moment_rate": {**_POSITIVE, "at_most": 1e12, "unit": "N m/s"},
-    "plan_hz": {**_POSITIVE, "at_most": 1e4, "unit": "Hz"},
-    "plan_steps": {"at_least": 1, "at_most": 1000},
-    "plan_step": {**_POSITIVE, "at_most": 10.0, "unit": "s"},
-    "track": {**_POSITIVE, "at_most": 1e12},
-    "spread": {"at_least": 0.0, "at_most": 10.0, "unit": "deg"},
-}
 
 
 @dataclass(frozen=True)
@@ -144,16 +107,16 @@ class Scenario:
             raise fail("limits", self.limits, "Limits")
         one_of("about", self.about, ("tilt", "yaw"))
         corner = isinstance(self.contact, str) and self.contact == "corner"
-        for key in _RANGES:
+        for key in RANGES:
             if key in ("theta", "theta_end") and not corner:  # what an object allows, its plan knows
                 number(key, getattr(self, key), at_least=-360.0, at_most=360.0, unit="deg")
-            elif getattr(self, key) is not None or key not in _OPTIONAL:
-                number(key, getattr(self, key), **_RANGES[key])
+            elif getattr(self, key) is not None or key not in OPTIONAL:
+                number(key, getattr(self, key), **RANGES[key])
         object.__setattr__(self, "world", MappingProxyType(dict(self.world)))
         for key, value in self.world.items():
             if key not in HIDDEN_KEYS:
                 raise fail(f"world.{key}", value, "one of " + ", ".join(f"world.{k}" for k in HIDDEN_KEYS))
-            number(f"world.{key}", value, **_RANGES[key])
+            number(f"world.{key}", value, **RANGES[key])
         swing = self.amplitude if self.reference == "sine" else 0.0
         if corner and not LOWEST <= self.theta - swing <= self.theta + swing <= 90.0 - LOWEST:
             raise fail("amplitude", swing, f"such that the block stays on its corner about theta = {self.theta:g} deg")
@@ -245,26 +208,10 @@ class Scenario:
         for key, value in plain.items():
             if key not in KEYS:
                 raise fail(key, value, "a known key: " + ", ".join(KEYS) + ", world." + ", world.".join(HIDDEN_KEYS))
-            plain[key] = _parsed(key, value)
+            plain[key] = parsed(key, value)
         kept = {key: value for key, value in self.world.items() if key not in plain}
-        world = {**kept, **{key: _parsed(key, value, "world.") for key, value in hidden.items()}}
+        world = {**kept, **{key: parsed(key, value, "world.") for key, value in hidden.items()}}
         return replace(self, **plain, world=world)
-
-
-_WORDS = ("reference", "law", "integrator")
-KEYS = (*_WORDS, *_RANGES)
-
-
-def _parsed(key: str, value: Any, prefix: str = "") -> Any:
-    """The value of a key, from the command line's text if need be."""
-    if key in _WORDS:
-        return value
-    if isinstance(value, str):
-        try:
-            return float(value)
-        except ValueError:
-            raise fail(prefix + key, value, "a number") from None
-    return value
 
 
 def own_object(
