@@ -177,7 +177,7 @@ def test_a_radius_that_is_left_out_is_caught(pill: Run, tmp_path: Path) -> None:
     assert np.abs(turning(run)).max() > 0.5
     case = own(tmp_path, mjcf(PILL, table='euler="0 20 0"'), "vertex")
     right = simulate(case)
-    rolls(right)
+    assert right.verdict == "pass"
     for point in (centre, [0.03, 0.0, -0.07]):
         wrong = attach(right.model, body="b", contacts=[point], margin=0.2).controller
         assert simulate(case, controller=wrong).verdict == "fail"
@@ -196,18 +196,37 @@ def test_slip_is_counted_from_rolling(pill: Run) -> None:
         (mjcf(PILL, table='euler="6 4 0"'), "vertex", {}),
         (mjcf(PILL, pose='euler="0 70 10"'), "lowest", {"theta": 25.0, "theta_end": 5.0}),
         (mjcf(PILL, pose='euler="0 20 0"'), [[0.0, 0.0, -0.1]], {"theta_end": 150.0}),
+        (mjcf(PILL), "vertex", {"reference": "sine", "theta": 20.0, "amplitude": 8.0, "period": 1.0}),
         (mjcf(HAMMER), [[0.0, 0.0, -0.15]], {"theta": 1.5, "theta_end": 21.5}),
         (mjcf(PILL), "vertex", {"about": "yaw", "theta": 0.0, "theta_end": 90.0}),
         (mjcf(PILL.replace("/>", ' euler="0 90 0"/>'), PLANAR), "lowest", {}),
         (mjcf(PILL, PLANAR), [0.0, 0.0, -0.07], {}),
     ],
-    ids=["tilted table", "lowest", "tip, over the top", "mixed", "yaw", "planar", "planar, on end"],
+    ids=[
+        "tilted table",
+        "lowest",
+        "tip, over the top",
+        "from a turning start",
+        "mixed",
+        "yaw",
+        "planar",
+        "planar, on end",
+    ],
 )
 def test_rolls(text: str, contact: object, keys: dict, tmp_path: Path) -> None:
     run = simulate(own(tmp_path, text, contact, **keys))
     rolls(run)
     assert run.radius[0] in (0.03, 0.012)
     assert (np.abs(run.rolled).max() > 1e-3) == ("about" not in keys)
+
+
+def test_of_a_ball_only_the_way_to_its_centre_turns(tmp_path: Path) -> None:
+    """MuJoCo's own slip of a fat capsule on a soft contact, turned by 40 deg in 0.3 s, is predicted within 3 %."""
+    fat = '<geom type="capsule" size=".2 .05" mass=".4"/>'
+    keys = {"theta": 2.0, "theta_end": 42.0, "seconds": 0.3, "timeconst": 0.01, "spread": 0.0}
+    run = simulate(own(tmp_path, mjcf(fat), **keys))  # type: ignore[arg-type]
+    assert run.measures.slip_max_m[0] > 2e-4
+    assert np.linalg.norm(run.slip - predicted_slip(run), axis=-1).max() < 0.03 * run.measures.slip_max_m[0]
 
 
 def test_a_capsule_is_laid_on_its_side(tmp_path: Path) -> None:
