@@ -138,13 +138,16 @@ def planar_stance(
         left = [int((points @ right).argmin())]
         held = _held(body, points[left], owner[left], up)
     else:
-        held = _given(body, np.asarray(contact) @ flat)
+        given = np.asarray(contact)
+        held = _given(body, given @ flat if given.dtype.kind in "iuf" and given.shape[-1:] == (3,) else given)
     (point, *_), radius = held
     if len(held[0]) > 1 or point @ up - radius > body.least(up).min() + body.reach:
         raise ModelError(
             f"contact = {np.asarray(contact).tolist()}: must be one lowest corner of the body at theta = 0"
         )
     high = (_rolling(body, point, radius, up, right) if radius else _interval(body, held[0], up, right))[1]
+    if np.isinf(high):
+        raise ModelError(f"body = {body.name!r}: it is round in the plane, and rolls: no tilt lifts it off one point")
     return point, radius, high
 
 
@@ -236,7 +239,7 @@ def _turn(body: Hull, held: Held, up: Array, now: Array | None = None) -> Stance
             inward = np.cross(np.eye(3)[np.abs(up).argmin()], up)
         inward = inward / np.linalg.norm(inward)
     low, high = _interval(body, points, up, inward) if radius == 0.0 else _rolling(body, points[0], radius, up, inward)
-    if high - low <= LEAST:
+    if not LEAST < high - low < np.inf:  # inf: nothing else ever touches, so it lies on nothing
         return None
     t, n = np.cos(low) * inward - np.sin(low) * up, np.sin(low) * inward + np.cos(low) * up
     x, y = (1.0, 0.0) if now is None else (now @ inward)[:2] / np.linalg.norm((now @ inward)[:2])
@@ -286,7 +289,7 @@ def _rolling(body: Hull, centre: Array, radius: float, up: Array, inward: Array)
     half = np.where(larger <= -far, np.inf, np.arccos(np.clip(larger / np.maximum(far, 1e-300), -1.0, 1.0)))
     half[(far <= body.reach) & (np.abs(larger) <= body.reach)] = -np.inf  # on the axis: it stays there
     middle = np.arctan2(points[:, 1], points[:, 0])
-    return float((middle - half).max()), float((middle + half).min())
+    return float((middle - half).max(initial=-np.inf)), float((middle + half).min(initial=np.inf))
 
 
 def _given(body: Hull, contact: ArrayLike) -> Held:

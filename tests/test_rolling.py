@@ -16,7 +16,7 @@ import pytest
 from pivoting.controller import Body, Contact, Law, Motion, WrenchController
 from pivoting.controller.controller import world_wrench
 from pivoting.controller.rotations import Turn
-from pivoting.models import load, read_body
+from pivoting.models import ModelError, load, read_body
 from pivoting.models.hull import read_hull
 from pivoting.sim import Run, assert_sticking, assert_tracking, attach, own_object, simulate
 from pivoting.sim.monitor import predicted_slip
@@ -312,6 +312,21 @@ def test_recording(pill: Run, tmp_path: Path) -> None:
     assert np.linalg.norm(at[-1] - at[0]) == pytest.approx(0.03 * np.ptp(pill.theta[0]), rel=1e-2)
     (solid,) = body_solids(pill.model, read_body(pill.model, "b"))
     assert np.abs(solid.vertices).max(axis=0) == pytest.approx([0.03, 0.03, 0.1])
+
+
+@pytest.mark.parametrize(
+    ("geoms", "contact", "message"),
+    [
+        (PILL.replace("/>", ' euler="90 0 0"/>'), "lowest", "it is round in the plane, and rolls"),
+        (PILL, [0.0, 0.0, 0.07], "must be one lowest corner"),
+        (PILL, [0.0, 0.0, 0.0], "the centre of a round end of radius 0.03"),
+        (PILL, [0.0, 0.0], "must be vertex, edge"),
+        ('<geom size=".1"/>', "lowest", "no tilt lifts it off one point"),
+    ],
+)
+def test_refused_in_the_plane(geoms: str, contact: object, message: str, tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=message):
+        simulate(own(tmp_path, mjcf(geoms, PLANAR), contact))
 
 
 def test_command_line(tmp_path: Path) -> None:
