@@ -5,34 +5,41 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 from pivoting.controller.kernel import inlined
-from pivoting.controller.space import cross
+from pivoting.controller.space import cross, into
 from pivoting.controller.validate import Array, array, fail, number
 
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """A point of the object that sticks to its support, with the friction it may use.
+    """A point or a ball of the object that sticks to its support, with the friction it may use.
+
+    A ball, such as the end of a capsule, sticks by rolling: it turns about where it touches, which moves on with it.
 
     Attributes:
-        point: (d,) from the centre of mass to the contact, object axes [m]; d = 2 (x, z) or 3.
+        point: (d,) from the centre of mass to the contact or the ball's centre, object axes [m]; d = 2 (x, z) or 3.
         mu: friction coefficient, > 0.
         f_min: floor of the normal force [N], >= 0 (a truncated cone).
         frame: (d, d) contact axes as columns, tangent(s) first and the normal (into the object) last, in world axes;
             None means the table's own frame.
+        radius: of the ball [m], >= 0; it touches at its centre less radius times the normal. 0: a point.
     """
 
     point: Array
     mu: float
     f_min: float = 0.0
     frame: Array | None = None
+    radius: float = 0.0
 
-    def __init__(self, point: ArrayLike, mu: float, f_min: float = 0.0, frame: ArrayLike | None = None):
+    def __init__(
+        self, point: ArrayLike, mu: float, f_min: float = 0.0, frame: ArrayLike | None = None, radius: float = 0.0
+    ):
         where = array("point", point, (None,))
         if where.size not in (2, 3):
             raise fail("point", where, "of length 2 (x, z) or 3 (x, y, z)")
         object.__setattr__(self, "point", where)
         object.__setattr__(self, "mu", number("mu", mu, above=0.0))
         object.__setattr__(self, "f_min", number("f_min", f_min, at_least=0.0, unit="N"))
+        object.__setattr__(self, "radius", number("radius", radius, at_least=0.0, unit="m"))
         if frame is not None:
             axes = array("frame", frame, (where.size, where.size))
             if np.abs(axes.T @ axes - np.eye(where.size)).max() > 1e-6:
@@ -48,19 +55,23 @@ class Contact:
 
 
 @inlined
-def fill_jacobian(R, points, frames, wrench_map, force_map, J):  # type: ignore[no-untyped-def]
+def fill_jacobian(R, points, offsets, frames, wrench_map, force_map, J):  # type: ignore[no-untyped-def]
     """Write the contact Jacobian into J (nw, K d): contact forces, in contact axes, to the wrench in object axes.
 
-    J_c = [I; r^] R(theta) with r^ f = r x f, which in the plane is r^ = [-r_y, r_x] (erratum 3 of the notes).
+    J_c = [I; r^] R(theta) with r^ f = r x f, which in the plane is r^ = [-r_y, r_x] (erratum 3 of the notes), and r
+    from the CoM to where the contact touches.
 
     Args:
         R: (3, 3) object to world.
-        points: (K, 3) contacts from the CoM, object axes [m].
+        points: (K, 3) contacts, or the centres of balls, from the CoM, object axes [m].
+        offsets: (K, 3) from there to where they touch, -radius n, world axes [m].
         frames: (K, 3, 3) contact axes as columns (t, o, n), world axes.
         wrench_map, force_map: (nw, 6) and (3, d), see `Space`.
     """
     dim = force_map.shape[1]
     for i in range(points.shape[0]):
+        o0, o1, o2 = into(R, offsets[i, 0], offsets[i, 1], offsets[i, 2])
+        r0, r1, r2 = points[i, 0] + o0, points[i, 1] + o1, points[i, 2] + o2
         for j in range(dim):
             a0 = a1 = a2 = 0.0
             for axis in range(3):  # axis j of the contact frame, in object axes: R^T frame
@@ -72,7 +83,7 @@ def fill_jacobian(R, points, frames, wrench_map, force_map, J):  # type: ignore[
                     a0 += R[p, 0] * u
                     a1 += R[p, 1] * u
                     a2 += R[p, 2] * u
-            m0, m1, m2 = cross(points[i, 0], points[i, 1], points[i, 2], a0, a1, a2)
+            m0, m1, m2 = cross(r0, r1, r2, a0, a1, a2)
             for row in range(wrench_map.shape[0]):
                 J[row, dim * i + j] = (
                     wrench_map[row, 0] * a0

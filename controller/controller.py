@@ -25,8 +25,10 @@ class Belief(NamedTuple):
     """What the compiled loop needs to know, as arrays; see `fill_jacobian` and `fill_required` for their meaning."""
 
     points: Array
+    offsets: Array
     frames: Array
     pivot: Array
+    offset: Array
     mu: Array
     f_min: Array
     mass: float
@@ -50,7 +52,8 @@ class WrenchController:
         gravity: (d,) in world axes [m/s^2]; in the plane (x, z), or (3,) for a plane that is not x-z.
         base: (4,) quaternion of the table in the world, for planar contacts; theta is measured from the table.
         margin: share of mu kept unused.
-        Q_w, Q_f: weights in object axes; Q_w defaults to a characteristic length of |pivot| (see `wrench_weight`).
+        Q_w, Q_f: weights in object axes; Q_w defaults to a characteristic length of |pivot|, and the radius if it
+            rolls (see `wrench_weight`).
     """
 
     body: Body
@@ -82,6 +85,7 @@ class WrenchController:
             raise fail("contacts", held, "at least one contact, all planar or all spatial")
         dim, n = held[0].dim, len(held) * held[0].dim
         reach = float(np.linalg.norm(np.mean([contact.point for contact in held], axis=0)))
+        reach += float(np.mean([contact.radius for contact in held]))
         if Q_w is None and reach == 0.0:
             raise fail("contacts", held, "away from the centre of mass, or Q_w given")
         put = object.__setattr__
@@ -106,11 +110,14 @@ class WrenchController:
         here = self.space
         table = rotation_matrix(here.base)
         points = np.array([here.lift(contact.point) for contact in self.contacts])
-        frames = [_lifted_frame(contact, here, table) for contact in self.contacts]
+        frames = np.array([_lifted_frame(contact, here, table) for contact in self.contacts])
+        offsets = -frames[:, :, 2] * np.array([[contact.radius] for contact in self.contacts])
         return Belief(
             points=points,
-            frames=np.array(frames),
+            offsets=offsets,
+            frames=frames,
             pivot=points.mean(axis=0),
+            offset=offsets.mean(axis=0),
             mu=np.array([(1.0 - self.margin) * contact.mu for contact in self.contacts]),
             f_min=np.array([contact.f_min for contact in self.contacts]),
             mass=float(self.body.mass),
@@ -170,10 +177,10 @@ def _lifted_frame(contact: Contact, here: Space, table: Array) -> Array:
 def _fill_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ignore[no-untyped-def]
     """Write R (3, 3), J (nw, K d) and the required wrench b (nw,) at one state."""
     fill_rotation(q, R)
-    fill_jacobian(R, belief.points, belief.frames, belief.wrench_map, belief.force_map, J)
+    fill_jacobian(R, belief.points, belief.offsets, belief.frames, belief.wrench_map, belief.force_map, J)
     fill_required(
         R, q, omega, q_d, omega_d, alpha_d, belief.law, belief.mass, belief.inertia, belief.gravity, belief.pivot,
-        belief.wrench_map, b,
+        belief.offset, belief.wrench_map, b,
     )  # fmt: skip
 
 

@@ -33,7 +33,9 @@ class Law:
 
     alpha = feedforward alpha_d + kp e + kd (omega_d - omega), about the contact, and the wrench required is
     (m (a - g), I alpha + c omega x I omega) with a = alpha x rho + c omega x (omega x rho), rho from contact to CoM and
-    c = 1 where velocities count. The three formulations of the notes are three choices of these four coefficients:
+    c = 1 where velocities count. On a ball of radius s, which rolls, v = omega x (s n - R p) with the normal n at rest:
+    alpha acts on rho = s n - R p and omega x (omega x .) on the part of it that turns, -R p.
+    The three formulations of the notes are three choices of these four coefficients:
 
     - static: all zero. What balances, J f + w + m g = 0; it does not correct errors.
     - quasi-dynamic: kp = 1/h^2, all else zero: M (q_d - q)/h^2 = J f + w + m g. On a second-order plant it oscillates
@@ -80,7 +82,7 @@ class Law:
 
 
 @inlined
-def fill_required(R, q, omega, q_d, omega_d, alpha_d, law, mass, inertia, gravity, pivot, wrench_map, out):  # type: ignore[no-untyped-def]
+def fill_required(R, q, omega, q_d, omega_d, alpha_d, law, mass, inertia, gravity, pivot, offset, wrench_map, out):  # type: ignore[no-untyped-def]
     """Write the required wrench (nw,) in object axes: what contact and applied wrench must make together.
 
     Args:
@@ -88,7 +90,8 @@ def fill_required(R, q, omega, q_d, omega_d, alpha_d, law, mass, inertia, gravit
         q_d, omega_d, alpha_d: the reference's orientation, angular velocity and acceleration, likewise.
         law: (feedforward, kp, kd, velocity_terms).
         mass: [kg]; inertia: (3, 3) object axes [kg m^2]; gravity: (3,) world axes [m/s^2].
-        pivot: (3,) from the CoM to the point that stays put (the contacts' mean), object axes [m].
+        pivot: (3,) from the CoM to the point that stays put (the contacts' mean), or rolls, object axes [m].
+        offset: (3,) from there to where it touches (the contacts' mean), world axes [m].
         wrench_map: (nw, 6), see `Space`.
     """
     feedforward, kp, kd, c = law
@@ -99,9 +102,10 @@ def fill_required(R, q, omega, q_d, omega_d, alpha_d, law, mass, inertia, gravit
     a0 = feedforward * a0 + kp * e0 + kd * (v0 - w0)
     a1 = feedforward * a1 + kp * e1 + kd * (v1 - w1)
     a2 = feedforward * a2 + kp * e2 + kd * (v2 - w2)
-    # acceleration of the CoM on its arc about the pivot; rho = -pivot
+    # acceleration of the CoM on its arc about the pivot; of rho the turning part is -pivot
     r0, r1, r2 = -pivot[0], -pivot[1], -pivot[2]
-    t0, t1, t2 = cross(a0, a1, a2, r0, r1, r2)
+    o0, o1, o2 = into(R, offset[0], offset[1], offset[2])
+    t0, t1, t2 = cross(a0, a1, a2, r0 - o0, r1 - o1, r2 - o2)
     u0, u1, u2 = cross(w0, w1, w2, r0, r1, r2)
     n0, n1, n2 = cross(w0, w1, w2, u0, u1, u2)
     g0, g1, g2 = into(R, gravity[0], gravity[1], gravity[2])

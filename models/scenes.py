@@ -145,7 +145,7 @@ def instrument(
         spec: the model; sensors are added to it.
         body: what `read_body` found.
         support: name of the geom that it stands on.
-        contacts: (K, 3) the points that are to stick, body frame [m].
+        contacts: (K, 3) the points that are to stick, body frame [m]; of what rolls, which is one, the centre.
 
     Returns:
         The model, and where each reading is in sensordata: position (3) of the CoM, quaternion (4) object to

@@ -11,7 +11,7 @@ from pivoting.controller.laws import Body, Law
 from pivoting.controller.solution import Solution
 from pivoting.controller.solvers import solve
 from pivoting.controller.space import Motion, quaternion_product
-from pivoting.controller.validate import fail
+from pivoting.controller.validate import array, fail
 from pivoting.models.reading import ModelError, RigidBody, matrix, read_body, read_friction
 
 Array = NDArray[np.float64]
@@ -95,6 +95,7 @@ def attach(
     *,
     body: str,
     contacts: Sequence[ArrayLike],
+    radius: ArrayLike = 0.0,
     law: Law | None = None,
     mu: float | None = None,
     margin: float = 0.1,
@@ -112,7 +113,8 @@ def attach(
         model: any compiled model.
         body: name of a top-level body that moves freely, or by two slides and a hinge.
         contacts: the points that stick, in the body frame: [(x, y, z), ...]; one point in the plane, where [(u, v)]
-            along the in-plane axes will do as well [m].
+            along the in-plane axes will do as well [m]. Of what rolls, such as the end of a capsule, the centre.
+        radius: of what rolls, 0 of a point; one number, or one for each contact [m].
         law: default `Law.dynamic()`.
         mu: friction to plan with; default what MuJoCo combines from the geoms.
         margin: share of mu kept unused; exactly on the cone's edge nothing sticks.
@@ -130,13 +132,14 @@ def attach(
     if not isinstance(contacts, Sequence | np.ndarray) or len(contacts) == 0:
         raise fail("contacts", contacts, "a list of at least one point")
     points = [found.point(contact) for contact in contacts]
+    radii = array("radius", np.broadcast_to(radius, len(points)) if np.ndim(radius) == 0 else radius, (len(points),))
     if found.dim == 2 and len(points) != 1:
         raise ModelError(f"contacts = {[p.tolist() for p in points]}: must be one point for a planar body")
     friction = read_friction(model, found.index, found.support) if mu is None else mu
     frame = None if found.dim == 2 else matrix(found.table)
     controller = WrenchController(
         Body(found.mass, found.inertia),
-        [Contact(point, friction, f_min, frame=frame) for point in points],
+        [Contact(at, friction, f_min, frame=frame, radius=float(rho)) for at, rho in zip(points, radii, strict=True)],
         Law.dynamic() if law is None else law,
         found.gravity,
         base=found.table,

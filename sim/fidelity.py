@@ -10,7 +10,9 @@ corner. So the material corner drifts along the table at
     + c_t (1 / b - h / 2)      rotation; nothing at b h = 2, where the row rings for ever
     + w delta / 2              the lever of the penetration
 
-and the contact opens where delta < 0: never by turning alone at b h = 2.
+and the contact opens where delta < 0: never by turning alone at b h = 2. A ball of radius s that rolls has its centre
+at R p and touches at r = R p - s n, with the normal n at rest: only R p turns, and all of this holds of it with
+c = w x (w x R p) for where it touches less what it has rolled, the sum of w x (s n) h with w at the end of the step.
 f is the load of one contact point: an edge of the box makes two, which share it. docs/fidelity.md measures all three.
 """
 
@@ -63,19 +65,19 @@ def read_rows(model: mujoco.MjModel, data: mujoco.MjData, body: int, support: in
     )
 
 
-def drift(rows: ContactRows, lever: Array, omega: Array, force: Array) -> Array:
-    """Predicted velocity (..., K, 2) [m/s] of K material points along the table, (t, o).
+def drift(rows: ContactRows, turning: Array, omega: Array, force: Array) -> Array:
+    """Predicted slip (..., K, 2) [m/s] of K contacts along the table, (t, o).
 
     Args:
         rows: of the contact, whose points share the load of the K.
-        lever: (..., K, 3) from the CoM to each point, table axes [m].
+        turning: (..., K, 3) from the CoM to each point, or to the centre of what rolls, table axes [m].
         omega: (..., 3) angular velocity, table axes [rad/s].
         force: (..., K, 3) predicted contact forces (f_t, f_o, f_n) [N].
     """
-    turning = np.broadcast_to(omega[..., None, :], lever.shape)
-    c = np.cross(turning, np.cross(turning, lever))
+    w = np.broadcast_to(omega[..., None, :], turning.shape)
+    c = np.cross(w, np.cross(w, turning))
     load = force * (force.shape[-2] / rows.points)
     depth = np.maximum(rows.R_n * load[..., 2] - c[..., 2] * (1.0 - 0.5 * rows.b * rows.h), 0.0) / rows.k
     below = -0.5 * depth[..., None] * np.array([0.0, 0.0, 1.0])  # from the constrained point to the material one
-    drifts = -rows.R_t * load / rows.b + c * (1.0 / rows.b - 0.5 * rows.h) + np.cross(turning, below)
+    drifts = -rows.R_t * load / rows.b + c * (1.0 / rows.b - 0.5 * rows.h) + np.cross(w, below)
     return drifts[..., :2]

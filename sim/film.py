@@ -143,7 +143,7 @@ class Film:
 
     @cached_property
     def corner(self) -> Array:
-        """(states, K, 3) the material contact points, world axes [m]."""
+        """(states, K, 3) where the contacts touch, world axes [m]."""
         return self.run.truth.origin + self.run.corner[self.world, : self.states] @ self.run.table_axes.T
 
     @cached_property

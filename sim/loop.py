@@ -113,6 +113,7 @@ def simulate(
         model=model,
         truth=truth,
         points=np.array([space(d).lift(truth.point(contact)) for contact in plan.contacts]),
+        radius=plan.radius,
         face=np.array([space(d).lift(truth.point(corner)) for corner in plan.face]),
         turn=(plan.axis, plan.start),
         mu_world=read_friction(model, truth.index, truth.support),
@@ -146,13 +147,14 @@ def _start(
 ) -> ContactRows | None:
     """Put every world on its contact, off the reference by `errors` (W,) [rad]; its contact rows."""
     body = plan.body
-    data = mujoco.MjData(model)
-    lever = float(np.linalg.norm(body.com - plan.contacts[0]))
-    at = plan.at - START_DEPTH * lever * matrix(body.table)[:, 2]
+    data, up, point = mujoco.MjData(model), matrix(body.table)[:, 2], plan.contacts[0]
+    lever = float(np.linalg.norm(body.com - point) + plan.radius[0])
+    at = plan.at + (plan.radius[0] - START_DEPTH * lever) * up
     for qpos, qvel, error in zip(batch.bind("qpos"), batch.bind("qvel"), errors, strict=True):
         off = np.concatenate([[np.cos(0.5 * error)], np.sin(0.5 * error) * plan.axis])
-        place(model, data, body, quaternion_product(off, desired[0][0]), plan.contacts[0], at)
-        turn(model, data, body, desired[1][0], plan.contacts[0])
+        place(model, data, body, quaternion_product(off, desired[0][0]), point, at)
+        touching = point - plan.radius[0] * up @ data.xmat[body.index].reshape(3, 3)
+        turn(model, data, body, desired[1][0], touching)
         qpos[:], qvel[:] = data.qpos, data.qvel
     mujoco.mj_forward(model, data)
     return read_rows(model, data, body.index, body.support)
@@ -177,6 +179,7 @@ def believe(case: Scenario, controller: WrenchController | None = None) -> tuple
         nominal,
         body=case.body,
         contacts=list(plan.contacts),
+        radius=plan.radius,
         law=case.control_law(),
         mu=case.mu,
         margin=case.margin,

@@ -20,7 +20,7 @@ class Measures:
     """One value for each world, (W,); slip over the whole run, everything else after the scenario's `settle_s`.
 
     Attributes:
-        slip_max_m: greatest displacement of a material contact point along the table from where it started.
+        slip_max_m: greatest displacement of a contact along the table from where it started, less what it rolled.
         slip_floor_m: what the simulator's creep, rotation and penetration terms predict for it (`fidelity.drift`).
         angle_error_rms_deg, angle_error_max_deg: orientation against the reference.
         contact_lost_s: time in which the contact sensor shows no push on one of the contacts.
@@ -88,7 +88,7 @@ def predicted_slip(run: "Run") -> Array:
     if rows is None:
         return np.full(run.slip.shape, np.nan)
     lift = run.attached.controller.space.lift
-    speed = drift(rows, run.lever[:, :-1], run.angular_velocity[:, :-1] @ run.table_axes, lift(run.force))
+    speed = drift(rows, run.turning[:, :-1], run.angular_velocity[:, :-1] @ run.table_axes, lift(run.force))
     return np.concatenate([np.zeros_like(speed[:, :1]), np.cumsum(speed * run.dt, axis=1)], axis=1)
 
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from pivoting.controller.space import quaternion_product
-from pivoting.models.candidates import contact_points, stance, support_points
+from pivoting.models.candidates import Stance, planar_stance, stance, support_points
 from pivoting.models.reading import ModelError, RigidBody, matrix, quaternion, read_body
 from pivoting.sim.keys import LOWEST
 from pivoting.sim.scenario import Scenario
@@ -20,8 +20,9 @@ class Plan:
 
     Attributes:
         body: as the model has it.
-        contacts: (K, 3) the points that are to stick, body frame [m].
-        at: (3,) where the first of them stands, world axes [m].
+        contacts: (K, 3) the points that are to stick, or the centres of what is to roll, body frame [m].
+        radius: (K,) of what rolls, else 0 [m].
+        at: (3,) where the first of them touches the table, world axes [m].
         axis: (3,) unit vector that the object turns about, through the contacts, world axes.
         start: (4,) orientation at angle 0, object axes to world.
         range: the angles [rad] at which nothing else touches the support.
@@ -30,6 +31,7 @@ class Plan:
 
     body: RigidBody
     contacts: Array
+    radius: Array
     at: Array
     axis: Array
     start: Array
@@ -53,9 +55,9 @@ def planned(case: Scenario, model: mujoco.MjModel) -> Plan:
         mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_kinematics(model, data)
     now = data.xmat[body.index].reshape(3, 3)
-    if not isinstance(case.contact, str):
-        _refuse_above(model, body, case.contact, table.T @ now)
     found = stance(model, body.index, case.contact, quaternion(now), body.table)
+    if not isinstance(case.contact, str):
+        _refuse_above(model, body, found, table.T @ now)
     start, axis = table @ found.rotation, table @ found.axis
     low, high = found.range
     lands = case.limits.contacts_end > 0
@@ -68,36 +70,24 @@ def planned(case: Scenario, model: mujoco.MjModel) -> Plan:
     there = data.xpos[body.index] + now @ found.points[0] - body.origin
     at = body.origin + there - (there @ table[:, 2]) * table[:, 2]
     face = support_points(model, body.index, -found.rotation[2])
-    return Plan(body, found.points, at, axis, quaternion(start), limits, face)
+    return Plan(body, found.points, found.radius, at, axis, quaternion(start), limits, face)
 
 
 def _planar(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
     """In the plane the contact is the left end of the face that is down at theta = 0, unless it is given."""
     axes, table, gap = matrix(body.axes), matrix(body.table), np.deg2rad(LOWEST)
-    if isinstance(case.contact, str):
-        face = support_points(model, body.index, -axes[:, 2])
-        along = face @ axes[:, 0]
-        point = face[along < along.min() + 1e-6 * np.ptp(along)].mean(axis=0)
-    else:
-        point = np.reshape(np.asarray(case.contact, dtype=float), -1)
-        if point.shape != (3,):
-            raise ModelError(f"contact = {point.tolist()}: in the plane must be one point (x, y, z), body frame [m]")
-    others = (contact_points(model, body.index) - point) @ axes[:, [0, 2]]
-    apart = others[np.linalg.norm(others, axis=1) > 1e-6 * np.abs(others).max(initial=0.0)]
-    if not len(apart) or apart[:, 1].min() < -1e-6 * np.abs(apart).max():
-        raise ModelError(f"contact = {point.tolist()}: must be a lowest corner of the body at theta = 0 [m]")
-    most = np.pi - np.arctan2(np.maximum(apart[:, 1], 0.0), apart[:, 0]).max()  # when the next corner comes down
-    return Plan(body, point[None], body.origin, -table[:, 1], body.table, (gap, most - gap), point[None])
+    point, radius, most = planar_stance(model, body.index, case.contact, axes)
+    face = point - radius * axes[:, 2]
+    limits = (gap, most - gap)
+    return Plan(body, point[None], np.array([radius]), body.origin, -table[:, 1], body.table, limits, face[None])
 
 
-def _refuse_above(model: mujoco.MjModel, body: RigidBody, contact: ArrayLike, now: Array) -> None:
+def _refuse_above(model: mujoco.MjModel, body: RigidBody, found: Stance, now: Array) -> None:
     """Points that are given have to be the lowest of the body as its file has it, body to table axes `now` (3, 3)."""
-    points = np.atleast_2d(np.asarray(contact, dtype=float))
-    if points.shape[-1] != 3:
-        return  # `stance` says what is wrong
-    height = ((points - support_points(model, body.index, -now[2])[0]) @ now[2]).max()
-    if height > 1e-3 * np.linalg.norm(points - body.com, axis=-1).max():
+    lowest = support_points(model, body.index, -now[2])[0] @ now[2]
+    height = (found.points @ now[2] - found.radius).max() - lowest
+    if height > 1e-3 * (np.linalg.norm(found.points - body.com, axis=-1) + found.radius).max():
         raise ModelError(
-            f"contact = {points.tolist()}: as the file has the body, this is {height:.3g} m above the table that its "
-            'lowest point could stand on; must be among its lowest, or "vertex", "edge", "lowest"'
+            f"contact = {found.points.tolist()}: as the file has the body, this is {height:.3g} m above the table that "
+            'its lowest point could stand on; must be among its lowest, or "vertex", "edge", "lowest"'
         )

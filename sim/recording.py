@@ -3,7 +3,7 @@
 Nothing is recorded while the loop runs: `record` reads the arrays of a `Run` and sends whole columns. Entities:
 
     /world/table, /world/block            the solids, posed by transforms
-    /world/path/{corner,com}              where the material contact points and the CoM went
+    /world/path/{corner,com}              where the contacts and the CoM went
     /world/wrench/{force,moment,weight}   applied wrench w and weight at the CoM, world axes
     /world/contact/{predicted,measured}   contact forces f at the contact point, table axes
     /world/contact/cone/{planned,world}   (1 - margin) mu with the floor f_min, and the mu of the world

@@ -36,7 +36,8 @@ class Run:
         seed: of the worlds' initial errors.
         attached: the controller and what it believes.
         model: the world's, with the sensors of the loop.  truth: the body as that has it.
-        points: (K, 3) the world's contact points from the CoM, object axes [m].
+        points: (K, 3) the world's contact points, or centres of what rolls, from the CoM, object axes [m].
+        radius: (K,) of what rolls, else 0 [m].
         face: (P, 3) likewise, the corners of the face that the object lies on at angle 0.
         turn: the axis (3,) [world axes] and the orientation (4,) at angle 0 that `theta` is counted from.
         mu_world: the world's friction.
@@ -68,6 +69,7 @@ class Run:
     model: mujoco.MjModel
     truth: RigidBody
     points: Array
+    radius: Array
     face: Array
     turn: tuple[Array, Array]
     mu_world: float
@@ -136,14 +138,34 @@ class Run:
         return matrix(self.truth.table)
 
     @cached_property
-    def lever(self) -> Array:
-        """(W, N+1, K, 3) from the CoM to the material contact points, table axes [m]."""
+    def turning(self) -> Array:
+        """(W, N+1, K, 3) from the CoM to the material contact points, or the centres of what rolls, table axes [m]."""
         return _frozen(self._from_com(self.points))
 
     @cached_property
+    def lever(self) -> Array:
+        """(W, N+1, K, 3) from the CoM to where the contacts touch, table axes [m]."""
+        return _frozen(self.turning - self._up)
+
+    @cached_property
     def corner(self) -> Array:
-        """(W, N+1, K, 3) material contact points from the table's origin, table axes [m]."""
+        """(W, N+1, K, 3) where the contacts touch, from the table's origin, table axes [m]."""
         return _frozen(self._com[..., None, :] + self.lever)
+
+    @cached_property
+    def rolled(self) -> Array:
+        """(W, N+1, K, 2) how far along the table (t, o) the contacts have rolled since the start [m].
+
+        The sum of omega x (radius n) dt, omega at the end of each step: with that velocity MuJoCo moves the body.
+        """
+        speed = np.cross((self.angular_velocity @ self.table_axes)[..., None, :], self._up)[..., :2]
+        speed[:, 0] = 0.0
+        return _frozen(np.cumsum(speed * self.dt, axis=1))
+
+    @property
+    def _up(self) -> Array:
+        """(K, 3) from where the contacts touch to their points, table axes [m]."""
+        return self.radius[:, None] * np.array([0.0, 0.0, 1.0])
 
     @cached_property
     def clearance(self) -> Array:
@@ -163,8 +185,8 @@ class Run:
 
     @cached_property
     def slip(self) -> Array:
-        """(W, N+1, K, 2) displacement of the material contact points along the table (t, o) since the start [m]."""
-        return _frozen(self.corner[..., :2] - self.corner[:, :1, :, :2])
+        """(W, N+1, K, 2) displacement of the contacts along the table (t, o) since the start, less `rolled` [m]."""
+        return _frozen(self.corner[..., :2] - self.corner[:, :1, :, :2] - self.rolled)
 
     @cached_property
     def friction_use(self) -> Array:
@@ -207,6 +229,7 @@ class Run:
             "model": str(self.scenario.path),
             "body": self.scenario.body,
             "contacts": self.points.tolist(),
+            "radius": self.radius.tolist(),
             "changes": self.scenario.changes,
             "limits": asdict(self.scenario.limits),
             "controller": self.controller,

@@ -5,13 +5,13 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.models.hull import circle, colliding, ellipsoids, samples
 from pivoting.models.reading import RigidBody, matrix
 from scipy.spatial import ConvexHull
 
 Array = NDArray[np.float64]
 SIDES = 32  # of what is round
 SHARP = np.cos(np.deg2rad(30.0))  # edges whose faces turn by more are drawn
-BOX = np.stack(np.meshgrid(*3 * [[-1.0, 1.0]], indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 class Solid(NamedTuple):
@@ -30,37 +30,13 @@ class Solid(NamedTuple):
 
 def body_solids(model: mujoco.MjModel, body: RigidBody) -> list[Solid]:
     """The colliding geoms of a body in object axes, as convex as MuJoCo takes them."""
-    paired = {*model.pair_geom1.tolist(), *model.pair_geom2.tolist()}
-    first = int(model.body_geomadr[body.index])
-    geoms = [
-        geom
-        for geom in range(first, first + int(model.body_geomnum[body.index]))
-        if model.geom_contype[geom] or model.geom_conaffinity[geom] or geom in paired
-    ]
-    points = [_points(model, geom) @ matrix(model.geom_quat[geom]).T + model.geom_pos[geom] for geom in geoms]
-    return [_hull((each - body.com) @ matrix(body.axes)) for each in points]
-
-
-def _points(model: mujoco.MjModel, geom: int) -> Array:
-    """(P, 3) points whose convex hull is the geom, in its own frame; what is round has them on its surface."""
-    size = np.array(model.geom_size[geom])
-    kind = mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
-    if kind == "mesh":
-        mesh = int(model.geom_dataid[geom])
-        first = int(model.mesh_vertadr[mesh])
-        return np.array(model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])], dtype=float)
-    along = np.linspace(0.0, np.pi, SIDES // 2 + 1)[:, None, None]
-    around = circle(SIDES)
-    ball = (np.sin(along) * around + np.cos(along) * [0.0, 0.0, 1.0]).reshape(-1, 3)
-    ends = size[1] * np.array([[[0.0, 0.0, -1.0]], [[0.0, 0.0, 1.0]]])
-    shapes = {
-        "box": size * BOX,
-        "ellipsoid": size * ball,
-        "sphere": size[0] * ball,
-        "capsule": size[0] * ball + ends,
-        "cylinder": size[0] * around + ends,
-    }
-    return shapes[kind].reshape(-1, 3)
+    geoms = colliding(model, body.index)
+    owner, centres, axes = ellipsoids(model, geoms)
+    round_ones = samples(SIDES)
+    clouds = [c + round_ones[int(np.count_nonzero(A.any(axis=0)))] @ A.T for c, A in zip(centres, axes, strict=True)]
+    whose = np.repeat(owner, [len(cloud) for cloud in clouds])
+    points = (np.concatenate(clouds) - body.com) @ matrix(body.axes)
+    return [_hull(points[whose == geom]) for geom in geoms]
 
 
 def _hull(points: Array) -> Solid:
@@ -73,12 +49,6 @@ def _hull(points: Array) -> Solid:
     sharp = [np.intersect1d(*hull.simplices[[i, j]]) for i, j in pairs if normals[i] @ normals[j] < SHARP]
     lines = hull.points[np.array(sharp, dtype=int).reshape(-1, 2)]
     return Solid(corners.reshape(-1, 3), np.repeat(normals, 3, axis=0), lines)
-
-
-def circle(sides: int) -> Array:
-    """(sides, 3) unit vectors around z, from -x; two sides are the directions of the plane."""
-    turn = 2.0 * np.pi * np.arange(sides) / sides
-    return np.stack([-np.cos(turn), -np.sin(turn), 0.0 * turn], axis=1).round(15)
 
 
 def cone(mu: float, low: float, high: float, dim: int) -> tuple[Array, NDArray[np.int64], list[Array]]:

@@ -230,7 +230,8 @@ def test_a_planar_object_of_ones_own(tmp_path: Path) -> None:
     assert run.verdict == "pass"
     with pytest.raises(ValueError, match=r"must be in \[0.1, 116.5\] deg"):
         turn_object(tmp_path, WEDGE, "lowest", theta_end=130.0)
-    refused(tmp_path, WEDGE, "lowest corner", [0.0, 0.0, 0.05])
+    refused(tmp_path, WEDGE, "no corner of body 'b'", [0.0, 0.0, 0.05])
+    refused(tmp_path, WEDGE, "one lowest corner", [0.05, 0.0, 0.1])
 
 
 def test_given_corners_are_turned_from_the_face_that_is_down(tmp_path: Path) -> None:

@@ -1,0 +1,218 @@
+"""What of a body touches a table: the convex hull of its colliding geoms, each of them as ellipsoids c + A x, |x| <= 1.
+
+A corner has A = 0, a ball (a sphere, an end of a capsule) three equal semi-axes, the rim of a cylinder two, any other
+ellipsoid three. Along a direction w one reaches to w.c + |A'w|: what touches a plane, and when while turning, has a
+closed form.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from pivoting.models.reading import Array, ModelError, matrix
+from scipy.spatial import ConvexHull, QhullError
+
+Indices = NDArray[np.int64]
+TOLERANCE = 1e-4  # of the body's size: what is closer to the table touches it
+SIDES = 64  # of what is round, in the hull
+
+
+def circle(sides: int) -> Array:
+    """(sides, 3) unit vectors around z, from -x; two sides are the directions of the plane."""
+    turn = 2.0 * np.pi * np.arange(sides) / sides
+    return np.stack([-np.cos(turn), -np.sin(turn), 0.0 * turn], axis=1).round(15)
+
+
+def samples(sides: int) -> dict[int, Array]:
+    """By the rank of A, the x (M, 3) that stand for |x| <= 1 in polygons and hulls."""
+    along = np.linspace(0.0, np.pi, sides // 2 + 1)[:, None, None]
+    ball = np.sin(along) * circle(sides) + np.cos(along) * [0.0, 0.0, 1.0]
+    return {0: np.zeros((1, 3)), 2: circle(sides), 3: ball.reshape(-1, 3)}
+
+
+SAMPLES = samples(SIDES)
+
+
+@dataclass(frozen=True, eq=False)
+class Hull:
+    """The N ellipsoids of a body, in its frame [m].
+
+    Attributes:
+        centre: (N, 3).  axes: (N, 3, 3) the A above.  rank: (N,) of A: 0, 2 or 3.
+        radius: (N,) of a ball, else 0.
+        geom: (N,) whose each is.
+        ups: (F, 3) inward normals of the hull's facets.  facets: (F, 3) of which three ellipsoids each is.
+        size: the hull's diagonal.  reach: what is closer to a plane is on it.
+    """
+
+    name: str
+    com: Array
+    centre: Array
+    axes: Array
+    rank: Indices
+    radius: Array
+    geom: Indices
+    ups: Array
+    facets: Indices
+    size: float
+    reach: float
+
+    def least(self, up: Array) -> Array:
+        """(N,) how far each reaches down along `up` (3,) [m]."""
+        least, wide = self.centre @ up, self.rank > 0
+        least[wide] -= np.linalg.norm(up @ self.axes[wide], axis=1)
+        return least
+
+    def lowest(self, up: Array, which: Indices) -> Array:
+        """(len(which), 3) their lowest points, along `up` (3,) or one (len(which), 3) for each."""
+        half = np.einsum("nij,ni->nj", self.axes[which], np.broadcast_to(up, (len(which), 3)))
+        unit = half / np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-300)
+        return self.centre[which] - np.einsum("nij,nj->ni", self.axes[which], unit)
+
+    def rims(self, point: Array) -> Array:
+        """(R, 3) of each rim the point closest to `point` (3,); from its axis all are as close: one is picked."""
+        which = np.flatnonzero(self.rank == 2)
+        return self.lowest(self.centre[which] - point - 1e-12 * self.axes[which, :, 0], which)
+
+    def touching(self, up: Array, every: int = 1) -> tuple[Array, Indices]:
+        """(M, 3) points on a table of normal `up`, `every`-th sample of a rim that lies flat; (M,) whose each is."""
+        least = self.least(up)
+        found = np.flatnonzero(least <= least.min() + self.reach)
+        flat = (self.rank[found] == 2) & (np.linalg.norm(up @ self.axes[found], axis=1) <= self.reach)
+        tilted = self.geom[found[(self.rank[found] == 2) & ~flat]].tolist()
+        egg = found[(self.rank[found] == 3) & (self.radius[found] == 0.0)]
+        rolling = [*self.geom[egg], *(geom for geom in tilted if tilted.count(geom) > 1)]
+        if rolling:
+            rolls = f"its geom {rolling[0]} touches the table there, and it rolls: no material point stays put"
+            raise ModelError(f"body = {self.name!r}: {rolls}; must be a corner, an edge, a rim or an end of a capsule")
+        rings = [self.centre[i] + SAMPLES[2][::every] @ self.axes[i].T for i in found[flat]]
+        points = np.concatenate([self.lowest(up, found[~flat]), *rings])
+        return points, np.concatenate([found[~flat], np.repeat(found[flat], len(SAMPLES[2][::every]))])
+
+    def support(self, up: Array) -> tuple[Array, Indices]:
+        """(K, 3) a point, a line's ends or a face's corners, a flat rim counted as four; (K,) whose each is."""
+        points, owner = self.touching(up, SIDES // 4)
+        around = outline(points, self.reach)
+        return points[around], owner[around]
+
+    def lies(self, owner: Indices) -> bool:
+        """Whether on points of these it lies: on a face, or as a capsule does on a line, one end of which is a ball."""
+        return len(owner) > 2 or (len(owner) == 2 and bool((self.radius[owner] > 0.0).any()))
+
+    def planes(self) -> Array:
+        """(P, 3) inward normals of planes to lie on: of the facets, and of lines that end on a ball.
+
+        The facets were of samples; those at a ball are made exact. On a line it may lie as a facet there does, or with
+        its CoM lowest.
+        """
+        balls = (self.radius > 0.0)[self.facets].any(axis=1)
+        found, lines = [*self.ups[~balls]], set()
+        for up, facet in zip(self.ups[balls], self.facets[balls], strict=True):
+            which = np.unique(facet)
+            if len(which) == 1:
+                continue
+            found.append(self._tangent(up, which))
+            if len(which) == 2:
+                lines.add(tuple(which.tolist()))
+        found += [self._tangent(self.centre[i] - self.com, np.array([i, j])) for i, j in lines]
+        unit = np.array([up for up in found if np.linalg.norm(up) > 0.5])
+        return unit[np.unique(np.round(unit, 6), axis=0, return_index=True)[1]]
+
+    def _tangent(self, up: Array, which: Indices) -> Array:
+        """Inward normal (3,) of the plane nearest to normal `up` that touches each of two or three; zero if none."""
+        for _ in range(8):  # converges quadratically, as Newton's method does
+            points = self.lowest(up, which)
+            across = points[1:] - points[0]
+            up = up - np.linalg.pinv(across, rcond=1e-9) @ (across @ up)
+            length = np.linalg.norm(up)
+            if length <= self.reach:
+                return np.zeros(3)
+            up = up / length
+        return up
+
+
+def read_hull(model: mujoco.MjModel, index: int, tolerance: float = TOLERANCE) -> Hull:
+    """The hull of a body's colliding geoms; corners that are inside it are dropped.
+
+    Args:
+        index: of the body.
+        tolerance: of the body's size, within which a point touches.
+
+    Raises:
+        ModelError: it has no colliding geom, one of a kind without a hull, or is one ball or ellipsoid.
+    """
+    name, geoms = model.body(index).name, colliding(model, index)
+    if not geoms:
+        raise ModelError(f"body = {name!r}: it has no colliding geom; must have one with contype, conaffinity or pair")
+    geom, centre, axes = ellipsoids(model, geoms)
+    extent = np.linalg.norm(axes, axis=2)
+    half = np.linalg.norm(axes, axis=1)
+    rank = np.count_nonzero(half, axis=1)
+    radius = np.where(np.ptp(half, axis=1) <= 1e-9 * half.max(axis=1), half.max(axis=1), 0.0)
+    if (rank == 3).all() and len(np.unique(centre[radius > 0.0], axis=0)) < 2:
+        rolls = "it is all sphere or ellipsoid, and these roll: no tilt lifts it off one point"
+        raise ModelError(f"body = {name!r}: {rolls}; must have a box, a mesh, a cylinder or a capsule")
+    size = float(np.linalg.norm((centre + extent).max(axis=0) - (centre - extent).min(axis=0)))
+    clouds = [c + SAMPLES[k] @ A.T for c, A, k in zip(centre, axes, rank.tolist(), strict=True)]
+    try:  # C-: facets that are coplanar but for rounding (meshes are float32) become one, their inner corners none
+        hull = ConvexHull(np.concatenate(clouds), qhull_options=f"Qt C-{0.1 * TOLERANCE * size}")
+    except QhullError:
+        raise ModelError(f"body = {name!r}: its colliding geoms are flat; must have a volume") from None
+    owner = np.repeat(np.arange(len(rank)), [len(cloud) for cloud in clouds])
+    keep = (rank > 0) | np.isin(np.arange(len(rank)), owner[hull.vertices])
+    fields = (centre[keep], axes[keep], rank[keep], radius[keep], geom[keep])
+    facets = (np.cumsum(keep) - 1)[owner[hull.simplices]]
+    com = np.array(model.body_ipos[index])
+    return Hull(name, com, *fields, -hull.equations[:, :3], facets, size, tolerance * size)
+
+
+def colliding(model: mujoco.MjModel, index: int) -> list[int]:
+    """The geoms of a body that may collide."""
+    paired = {*model.pair_geom1.tolist(), *model.pair_geom2.tolist()}
+    first = int(model.body_geomadr[index])
+    own = range(first, first + int(model.body_geomnum[index]))
+    return [geom for geom in own if model.geom_contype[geom] or model.geom_conaffinity[geom] or geom in paired]
+
+
+def ellipsoids(model: mujoco.MjModel, geoms: Sequence[int]) -> tuple[Indices, Array, Array]:
+    """Of which geom each is (N,), its centre (N, 3) and its semi-axes as columns of A (N, 3, 3), body frame [m]."""
+    pieces = [(i, at, half) for i in geoms for centres, half in [_pieces(model, i)] for at in centres]
+    geom, at, half = (np.array(column) for column in zip(*pieces, strict=True))
+    turn = np.array([matrix(model.geom_quat[i]) for i in geom])
+    return geom, model.geom_pos[geom] + np.einsum("nij,nj->ni", turn, at), turn * half[:, None, :]
+
+
+def _pieces(model: mujoco.MjModel, geom: int) -> tuple[Array, Array]:
+    """(n, 3) centres of a geom's ellipsoids, and (3,) the semi-axes of each, geom frame [m]."""
+    size, mesh = model.geom_size[geom], int(model.geom_dataid[geom])
+    kind = mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
+    if kind == "mesh":
+        graph, vertices = int(model.mesh_graphadr[mesh]), model.mesh_vert[model.mesh_vertadr[mesh] :]
+        count = int(model.mesh_graph[graph])  # the hull that MuJoCo collides with: vertices are after edge addresses
+        return vertices[model.mesh_graph[graph + 2 + count : graph + 2 + 2 * count]].astype(float), np.zeros(3)
+    one, ends = np.zeros((1, 3)), np.array([[0.0, 0.0, -size[1]], [0.0, 0.0, size[1]]])
+    shapes = {
+        "box": (size * list(product((-1.0, 1.0), repeat=3)), np.zeros(3)),
+        "cylinder": (ends, size[0] * np.array([1.0, 1.0, 0.0])),
+        "capsule": (ends, size[0] * np.ones(3)),
+        "sphere": (one, size[0] * np.ones(3)),
+        "ellipsoid": (one, size),
+    }
+    if kind not in shapes:
+        raise ModelError(f"body: its geom {geom} is of type {kind}; must be mesh, {', '.join(shapes)}")
+    return shapes[kind]
+
+
+def outline(points: Array, reach: float) -> Indices:
+    """Corners of the convex hull of coplanar (M, 3): one if all are within `reach`, a line's ends, or a polygon's."""
+    centred = points - points.mean(axis=0)
+    flat = centred @ np.linalg.svd(centred, full_matrices=False)[2][:2].T
+    spread = np.ptp(flat, axis=0)
+    if spread[0] <= reach:
+        return np.zeros(1, dtype=int)
+    if len(points) == 2 or spread[1] <= reach:
+        return np.array([flat[:, 0].argmin(), flat[:, 0].argmax()])
+    return np.array(ConvexHull(flat).vertices)
