@@ -15,6 +15,7 @@ from pivoting.controller.conic_program import ClarabelInPlace, Cones, ConicProgr
 from pivoting.controller.contact_set import free_axes
 from pivoting.controller.controller import WrenchController
 from pivoting.controller.limits import friction_limits, wrench_limits
+from pivoting.controller.so3 import CONJUGATE, rotated
 from pivoting.controller.validate import Array, number
 
 GIVE_UP, BREAK = 1e3, 1e5  # rho_a and rho_s, in weights: far above any multiplier of an answer that is worth having
@@ -51,18 +52,15 @@ class BoundedSolver:
     def __init__(self, controller: WrenchController, bounds: WrenchBounds, dt: float):
         number("dt", dt, above=0.0, unit="s")
         belief, dim = controller.belief, controller.space.dim
-        self._belief = belief
+        self._controller, self._belief = controller, belief
         self._unit = belief.mass * (float(np.linalg.norm(belief.gravity)) or 1.0)
         length = float(np.linalg.norm(belief.pivot)) or 1.0
         nw, n = len(belief.Q_w), len(belief.Q_f)
         self._scale = self._unit * np.array([1.0] * dim + [length] * (nw - dim))
         self._friction = friction_limits(belief.mu, belief.f_min / self._unit, dim)
         self._bounds = wrench_limits(bounds, nw, 0, self._scale, dt)
-        axes = free_axes(belief.points, belief.pivot, belief.wrench_map)
-        push = belief.mass * np.cross(axes, -belief.pivot), axes @ belief.inertia  # of a unit angular acceleration
-        self._give = belief.wrench_map @ np.hstack(push).T / self._scale[:, None]  # (nw, A)
-        self._give /= max(1e-300, float(np.abs(self._give).max(initial=0.0)))
-        A = self._give.shape[1]
+        self._axes = free_axes(belief.points, belief.pivot, belief.wrench_map)
+        A = len(self._axes)
         self._shape = nw, n, A
         wide = n + nw + A + nw + 2
         f, w, a, s = np.split(np.arange(wide - 2), np.cumsum([n, nw, A]))
@@ -80,8 +78,9 @@ class BoundedSolver:
             block[1:, columns] = -np.eye(len(columns))
             cone.append(block)
         balance = np.zeros((nw, wide))
-        balance[:, f], balance[:, w], balance[:, a], balance[:, s] = 1.0, np.eye(nw), -self._give, -np.eye(nw)
+        balance[:, f], balance[:, w], balance[:, a], balance[:, s] = 1.0, np.eye(nw), 1.0, -np.eye(nw)
         self._rows = np.vstack([balance, linear, *cone])
+        self._given = a
         self._cones = Cones(nw, len(linear), own.orders + bound.orders + (1 + A, 1 + nw))
         P = np.zeros((wide, wide))
         P[np.ix_(f, f)] = belief.Q_f
@@ -93,16 +92,19 @@ class BoundedSolver:
         self._q[t_a], self._q[t_s] = GIVE_UP, BREAK
         self._solve = ClarabelInPlace()
 
-    def __call__(self, jacobian: Array, required: Array, before: Array | None = None) -> BoundedWrench:
+    def __call__(self, orientation: Array, required: Array, before: Array | None = None) -> BoundedWrench:
         """The answer to a problem of the controller.
 
         Args:
-            jacobian, required: (nw, K d), (nw,) of the problem, see `WrenchProblem`.
+            orientation: (4,) object axes to world, at which it was stated.
+            required: (nw,) see `WrenchProblem`.
             before: (nw,) wrench applied until now, for bounds on the rate; None: not known.
         """
         nw, n, _ = self._shape
+        jacobian = self._controller.jacobian(orientation)
         rows = self._rows.copy()
         rows[:nw, :n] = jacobian * self._unit / self._scale[:, None]
+        rows[:nw, self._given] = -self._turning(orientation)
         last = None if before is None else np.asarray(before, dtype=float) / self._scale
         sides = self._bounds.sides(1, last)
         rest = np.zeros(sum(self._cones.orders[-2:]))
@@ -122,6 +124,14 @@ class BoundedSolver:
         return BoundedWrench(
             wrench, force.reshape(len(self._belief.mu), -1), lacking, kkt_residual(program, answer), exact
         )  # fmt: skip
+
+    def _turning(self, orientation: Array) -> Array:
+        """(nw, A) B, the wrenches that accelerate the object about its free axes, with entries up to 1."""
+        belief = self._belief
+        arm = -(belief.pivot + rotated(orientation * CONJUGATE, belief.offset))
+        push = np.hstack([belief.mass * np.cross(self._axes, arm), self._axes @ belief.inertia])
+        B = belief.wrench_map @ push.T / self._scale[:, None]
+        return B / max(1e-300, float(np.abs(B).max(initial=0.0)))
 
 
 def _one(matrix: Array, mask: Array) -> Sparse:

@@ -76,6 +76,8 @@ class Horizon:
     ):
         if not isinstance(controller, WrenchController):
             raise fail("controller", controller, "a WrenchController")
+        if any(contact.radius for contact in controller.contacts):
+            raise fail("controller", "one whose contact rolls", "one whose contacts are points of the object")
         if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or not 1 <= steps <= 10_000:
             raise fail("steps", steps, "a whole number from 1 to 10000")
         one_of("integrator", integrator, tuple(INTEGRATORS))

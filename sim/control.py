@@ -87,7 +87,7 @@ class BoundedControl:
             if not self._bounds.excess(out.wrench[i], last, self._dt) > OVER:
                 continue
             jacobian = self._controller.jacobian(states.orientation[i])
-            answer = self._solve(jacobian, jacobian @ out.force[i] + out.wrench[i], last)
+            answer = self._solve(states.orientation[i], jacobian @ out.force[i] + out.wrench[i], last)
             if not answer.residual <= 1e-6:
                 out.wrench[i], out.status[i] = np.nan, FAILED
                 continue
@@ -100,7 +100,7 @@ class BoundedControl:
         self._inner.prepare(states, out)
         for _ in range(2):  # set up, then in place
             jacobian = self._controller.jacobian(states.orientation[0])
-            self._solve(jacobian, jacobian @ out.force[0] + out.wrench[0])
+            self._solve(states.orientation[0], jacobian @ out.force[0] + out.wrench[0])
 
 
 class PlanLog(NamedTuple):
