@@ -142,7 +142,7 @@ def run(
 
 
 def main() -> None:
-    """Entry point: every wrong use ends in one line on stderr and exit code 2."""
+    """Entry point: every wrong use ends in one line on stderr and exit code 2; a fault of ours keeps its traceback."""
     try:
         code = cli.main(standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:
@@ -150,12 +150,20 @@ def main() -> None:
         code = 2
     except click.ClickException as error:
         code = _refuse(error.format_message())
-    except (ValueError, OSError) as error:
+    except _wrong_uses() as error:
         code = _refuse(str(error))
     except click.Abort:
         click.echo("pivoting: interrupted", err=True)
         code = 130
     sys.exit(code)
+
+
+def _wrong_uses() -> tuple[type[Exception], ...]:
+    """What is raised of arguments, models and files that cannot be used; any other ValueError is a fault of ours."""
+    from pivoting.controller.validate import InputError
+    from pivoting.models import ModelError
+
+    return InputError, ModelError, OSError
 
 
 def _refuse(message: str) -> int:
