@@ -29,13 +29,14 @@ def problems(K: int, dim: int, count: int) -> dict[str, float]:
         solve_all(many)
         rounds.append(perf_counter() - start)
     gap = dearer = relative = close = 0.0
-    refused = failed = converged = 0
+    refused = failed = unconverged = 0
     for i, data in enumerate(track(drawn if dim == 3 else [], f"{K} contacts, dim {dim}: whitened", transient=True)):
         problem = stated(data)
         mine, other = problem.objective(answers.wrench[i], answers.force[i]), whitened_objective(problem)
-        if np.isfinite(other):
-            converged += 1
-            close = max(close, abs(mine - other) / max(mine, other))
+        if not np.isfinite(other):
+            unconverged += 1
+            continue
+        close = max(close, abs(mine - other) / max(mine, other))
     for i, data in enumerate(track(drawn, f"{K} contacts, dim {dim}: Clarabel", transient=True)):
         problem = stated(data)
         try:
@@ -50,7 +51,7 @@ def problems(K: int, dim: int, count: int) -> dict[str, float]:
         dearer = max(dearer, (mine - other) / max(mine, other))
     name = f"{K} contacts, {'space' if dim == 3 else 'plane'}: "
     whitened = {
-        name + "whitened Clarabel converged to 1e-12": float(converged),
+        name + "whitened Clarabel not converged to 1e-10 of the optimum": float(unconverged),
         name + "greatest objective difference from whitened Clarabel / optimum": close,
     }
     return {
@@ -99,5 +100,6 @@ if __name__ == "__main__":
         bounds[name + "greatest KKT residual"] = 1e-10
         bounds[name + "greatest relative cost above Clarabel"] = 1e-7
         if dim == 3:
+            bounds[name + "whitened Clarabel not converged to 1e-10 of the optimum"] = 100  # of 20,000
             bounds[name + "greatest objective difference from whitened Clarabel / optimum"] = 1e-7
     main(__doc__ or "", measure, bounds)

@@ -132,10 +132,7 @@ class WrenchProblem:
             ValueError: in space without `edges`, where the cones are not linear; in the plane with them.
         """
         if self.dim != 2 and not edges:
-            raise ValueError(
-                f"problem.dim = {self.dim}: the standard QP form is planar, cones in space are not linear; "
-                "give edges for inscribed pyramids"
-            )
+            raise fail("edges", edges, "at least 3 in space, where cones are not linear (inscribed pyramids)")
         faces = self._pyramid(edges).facets if edges else np.array([[1.0], [-1.0]])
         nw, n = self.jacobian.shape
         K = self.contacts

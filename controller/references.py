@@ -16,11 +16,6 @@ class Reference(Protocol):
         """The desired motion at each of `times`."""
         ...
 
-    @property
-    def angles(self) -> tuple[float, float]:
-        """Least and greatest angle [rad] that it asks for."""
-        ...
-
 
 @dataclass(frozen=True)
 class Constant:
@@ -34,10 +29,6 @@ class Constant:
     def __call__(self, times: Array) -> Motion:
         zero = np.zeros(np.shape(times))
         return Motion(zero + self.theta, zero, zero.copy())
-
-    @property
-    def angles(self) -> tuple[float, float]:
-        return self.theta, self.theta
 
 
 @dataclass(frozen=True)
@@ -77,10 +68,6 @@ class MinimumJerk:
             acceleration += (end - start) / T**2 * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
         return Motion(angle, rate, acceleration)
 
-    @property
-    def angles(self) -> tuple[float, float]:
-        return min(self.waypoints), max(self.waypoints)
-
 
 @dataclass(frozen=True)
 class Sine:
@@ -99,10 +86,6 @@ class Sine:
         w = 2.0 * np.pi / self.period
         s, c = np.sin(w * np.asarray(times)), np.cos(w * np.asarray(times))
         return Motion(self.mean + self.amplitude * s, self.amplitude * w * c, -self.amplitude * w * w * s)
-
-    @property
-    def angles(self) -> tuple[float, float]:
-        return self.mean - abs(self.amplitude), self.mean + abs(self.amplitude)
 
 
 class Sampled:
@@ -127,8 +110,3 @@ class Sampled:
         inside = np.clip(times, 0.0, self._end)
         moving = (times >= 0.0) & (times <= self._end)
         return Motion(self._curve(inside), *(np.where(moving, self._curve(inside, k), 0.0) for k in (1, 2)))
-
-    @property
-    def angles(self) -> tuple[float, float]:
-        between = self._curve(np.linspace(0.0, self._end, 20 * self.samples.size))  # the spline overshoots its samples
-        return float(min(self.samples.min(), between.min())), float(max(self.samples.max(), between.max()))

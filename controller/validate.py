@@ -6,10 +6,14 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 
-def fail(name: str, value: object, allowed: str) -> ValueError:
+class InputError(ValueError):
+    """An argument that cannot be used; the message names it, its value and what is allowed."""
+
+
+def fail(name: str, value: object, allowed: str) -> InputError:
     """The error for an argument `name` whose `value` is not `allowed`."""
     shown = str(value.tolist()) if isinstance(value, np.ndarray) else repr(value)
-    return ValueError(f"{name} = {shown if len(shown) < 120 else shown[:117] + '...'}: must be {allowed}")
+    return InputError(f"{name} = {shown if len(shown) < 120 else shown[:117] + '...'}: must be {allowed}")
 
 
 def array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:

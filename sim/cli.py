@@ -144,7 +144,7 @@ def run(
 
 
 def main() -> None:
-    """Entry point: every wrong use ends in one line on stderr and exit code 2."""
+    """Entry point: every wrong use ends in one line on stderr and exit code 2; a fault of ours keeps its traceback."""
     try:
         code = cli.main(standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:
@@ -152,7 +152,7 @@ def main() -> None:
         code = 2
     except click.ClickException as error:
         code = _refuse(error.format_message())
-    except (ValueError, OSError) as error:
+    except _wrong_uses() as error:
         code = _refuse(str(error))
     except RuntimeError as error:  # no certified answer: the run ends without a verdict
         click.echo(f"pivoting: {error}", err=True)
@@ -161,6 +161,14 @@ def main() -> None:
         click.echo("pivoting: interrupted", err=True)
         code = 130
     sys.exit(code)
+
+
+def _wrong_uses() -> tuple[type[Exception], ...]:
+    """What is raised of arguments, models and files that cannot be used; any other ValueError is a fault of ours."""
+    from pivoting.controller.validate import InputError
+    from pivoting.models import ModelError
+
+    return InputError, ModelError, OSError
 
 
 def _refuse(message: str) -> int:

@@ -41,7 +41,7 @@ PURPLE, GREY, WHITE = (165, 130, 235), (170, 170, 170), (235, 235, 235)  # plann
 BLOCK, EDGES, TABLE, DARK = (70, 105, 145), (150, 185, 225), (120, 112, 100), (24, 26, 30)
 TITLES = {  # plot -> title, where the legend is
     "angle": ("angle [deg]", "LeftTop"),
-    "slip": ("slip of the corner [mm]", "LeftTop"),
+    "slip": ("contact slip [mm]", "LeftTop"),
     "friction_use": ("friction use |f_t| / (mu f_n)", "RightBottom"),
     "force": ("contact force [N]", "RightTop"),
     "f_n": ("normal force f_n [N]", "RightTop"),

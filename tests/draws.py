@@ -162,22 +162,23 @@ def _closed_form(J, b, Q_w, Q_f, mu, f_min, residual, scratch):  # type: ignore[
 
 
 def whitened_objective(problem: WrenchProblem) -> float:
-    """The optimum's cost by Clarabel in variables y with f = L^-T y, H = L L', where it is well conditioned.
+    """The optimum's cost by Clarabel alone, as the least distance to the cones from g, the optimum without them.
 
-    nan where Clarabel does not say that it converged, to 1e-12. In the full form its own error is the larger.
+    With f = L^-T y, H = Q_f + J'Q_w J = L L', g = L^-1 J'Q_w b the cost is 1/2 |y - g|^2 and what g itself costs, a sum
+    of squares. In 1/2 |y|^2 - g'y + 1/2 b'Q_w b all but a millionth may cancel, and Clarabel's gap, relative to such a
+    term, says little of the optimum. So g is the origin, and the unit, from a first answer of Clarabel's, such that
+    the optimum is 1/2: the gap of 1e-10 is then one of the optimum. nan where Clarabel does not say that it got there.
     """
     n, K = problem.jacobian.shape[1], problem.contacts
     J, b, Q_w = problem.jacobian, problem.required, problem.Q_w
-    L = np.linalg.cholesky(problem.Q_f + J.T @ Q_w @ J)
-    back = np.linalg.inv(L).T
+    back = np.linalg.inv(np.linalg.cholesky(problem.Q_f + J.T @ Q_w @ J)).T
     g = back.T @ (J.T @ Q_w @ b)
-    unit = float(np.abs(g).max()) or 1.0
     floors = [i for i in range(K) if problem.f_min[i] > 0.0]
-    rows, sides, cones = [], [], []
+    rows, sides, cones = [], [], []  # rows y + (slack in cones) = sides
     for i in floors:
         size = np.linalg.norm(back[3 * i + 2])
         rows.append(-back[3 * i + 2] / size)
-        sides.append(-problem.f_min[i] / (unit * size))
+        sides.append(-problem.f_min[i] / size)
     if floors:
         cones.append(clarabel.NonnegativeConeT(len(floors)))
     for i in range(K):
@@ -185,13 +186,20 @@ def whitened_objective(problem: WrenchProblem) -> float:
         rows += list(cone / np.abs(cone).max())
         sides += [0.0] * 3
         cones.append(clarabel.SecondOrderConeT(3))
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-12
-    settings.max_step_fraction = 0.95
-    A = sparse.csc_matrix(np.array(rows))
-    found = clarabel.DefaultSolver(
-        sparse.csc_matrix(np.eye(n)), -g / unit, A, np.array(sides), cones, settings
-    ).solve()  # fmt: skip
-    f = back @ (unit * np.array(found.x))
-    return problem.objective(b - J @ f, f) if str(found.status) == "Solved" else float("nan")
+    A, room = np.array(rows), np.array(sides) - np.array(rows) @ g
+    unit = float(np.abs(g).max()) or 1.0
+    cost, converged = float("nan"), False
+    for tolerance in (1e-8, 1e-10):
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
+        settings.tol_infeas_abs = settings.tol_infeas_rel = 1e-14  # a small load under great floors is not infeasible
+        settings.max_step_fraction = 0.95
+        found = clarabel.DefaultSolver(
+            sparse.csc_matrix(np.eye(n)), np.zeros(n), sparse.csc_matrix(A), room / unit, cones, settings
+        ).solve()
+        f = back @ (g + unit * np.array(found.x))
+        cost = problem.objective(b - J @ f, f)
+        converged = str(found.status) == "Solved"
+        unit = np.sqrt(2.0 * cost) or 1.0
+    return cost if converged else float("nan")

@@ -6,7 +6,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from pivoting.sim.cli import main
 
 KEYS = {
     "scenario", "seed", "worlds", "verdict", "failed_worlds", "slip_max_m", "slip_floor_m", "angle_error_rms_deg",
@@ -119,6 +121,18 @@ def test_wrong_calls_are_one_line_and_exit_2(words: list[str], message: str, tmp
     assert len(done.stderr.strip().splitlines()) == 1
     assert message in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_fault_of_ours_is_not_called_a_wrong_use(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A ValueError that no check of an argument raised keeps its traceback."""
+
+    def broken(console: object) -> None:
+        np.zeros(2) + np.zeros(3)
+
+    monkeypatch.setattr("pivoting.sim.report.print_scenarios", broken)
+    monkeypatch.setattr(sys, "argv", ["pivoting", "list"])
+    with pytest.raises(ValueError, match="broadcast"):
+        main()
 
 
 def test_out_that_is_a_file_is_refused_before_the_run(tmp_path: Path) -> None:
