@@ -18,7 +18,7 @@ from pivoting.controller.limits import friction_limits, wrench_limits
 from pivoting.controller.so3 import CONJUGATE, rotated
 from pivoting.controller.validate import Array, number
 
-GIVE_UP, BREAK = 1e3, 1e5  # rho_a and rho_s, in weights: far above any multiplier of an answer that is worth having
+GIVE_UP, BREAK = 1e2, 1e4  # rho_a and rho_s, in weights: far above any multiplier of an answer that is worth having
 EXACT = 1e-6  # of the weight: less than this is nothing given up
 
 

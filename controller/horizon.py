@@ -128,6 +128,13 @@ class Horizon:
             orientation = quaternion_product(orientation, exponential(arriving[3:]))
         return Path(position[None], orientation[None], before, arriving)
 
+    def height(self, state: BodyState) -> float:
+        """How far the lowest of the `clear` points is above the lowest contact, over the lever; inf without any."""
+        points = np.concatenate([self.controller.belief.points, self.clear])
+        heights = rotated(np.asarray(state.orientation), points) @ self.table[:, 2]
+        lowest = float(heights[: len(self.controller.contacts)].min())
+        return float((heights[len(self.controller.contacts) :] - lowest).min(initial=np.inf)) / self.length
+
     def arc(self, orientations: ArrayLike, state: BodyState) -> tuple[Array, Array]:
         """Desired poses, in world axes, that turn about the contacts where they are now: (N, 3) CoMs, (N, 4).
 

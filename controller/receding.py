@@ -12,7 +12,8 @@ from pivoting.controller.space import quaternion_product
 from pivoting.controller.transcription import INTEGRATORS
 from pivoting.controller.validate import Array, fail
 
-OUTCOMES = ("planned", "shifted", "holding")  # a plan; the last one shifted, as this one failed; none left to shift
+OUTCOMES = ("planned", "shifted", "holding", "released")  # what is followed, see `RecedingHorizon`
+LANDED = 1e-3  # of the lever: a watched point this close to the table has come down on it
 
 
 class Followed(NamedTuple):
@@ -36,8 +37,8 @@ class RecedingHorizon:
     """Plans every `period` seconds; all that is remembered is what `replan` returns and is given back.
 
     A plan that fails is replaced by the last one, shifted by the time that has passed; when that has run out, the
-    object is to stay as it is: the per-step law then holds it or, where the bounds do not allow that, lowers it as
-    gently as they do.
+    object is to stay as it is ("holding"): the per-step law then holds it or, where the bounds do not allow that,
+    lowers it as gently as they do. Once it has come down on another of its points, it is let go for good ("released").
 
     Attributes:
         planner: of the horizon.  period: [s].
@@ -61,6 +62,8 @@ class RecedingHorizon:
             last: what was followed until now; None at first.
             applied: (nw,) wrench until now, for bounds on its rate.
         """
+        if last is not None and last.outcome == "released":
+            return last
         horizon = self.planner.horizon
         desired = horizon.arc(orientations, state)
         guess, passes = None, 3 * self.passes
@@ -71,11 +74,9 @@ class RecedingHorizon:
         attempt = self.planner.plan(state, desired, guess=guess, applied=applied, passes=passes)
         if attempt.status in ("solved", "not converged"):
             return Followed(attempt, 0.0, "planned", attempt)
-        if last is None or last.plan is None:
-            return Followed(None, 0.0, "holding", attempt)
-        since = last.since + self.period
-        if since + self.period > horizon.steps * horizon.h + 1e-9:
-            return Followed(None, 0.0, "holding", attempt)
+        since = horizon.steps * horizon.h if last is None or last.plan is None else last.since + self.period
+        if last is None or since + self.period > horizon.steps * horizon.h + 1e-9:
+            return Followed(None, 0.0, "released" if horizon.height(state) < LANDED else "holding", attempt)
         return Followed(last.plan, since, "shifted", attempt)
 
 

@@ -191,7 +191,12 @@ class HorizonControl:
         self._follow(0, 0, states, out)
 
     def _follow(self, i: int, k: int, states: States, out: Answers) -> None:
-        """The per-step law of world i."""
+        """The per-step law of world i; nothing, where the object was let go."""
+        followed = self._followed[i]
+        if followed is not None and followed.outcome == "released":
+            for values in out:
+                values[i] = 0
+            return
         now = [values[i, k % self._every] for values in self._motions]
         one = [values[i : i + 1] for values in (states.orientation, states.angular_velocity)]
         step_worlds(self._belief, self._work, TOLERANCE, *one, *now, *(values[i : i + 1] for values in out))
@@ -209,11 +214,13 @@ class HorizonControl:
         last = self._followed[i]
         now = self._horizons[i].replan(state, self._wanted(k), last, applied)
         self._followed[i] = now
+        self.log.outcome[i, k // self._every] = OUTCOMES.index(now.outcome)
+        if now is last:  # let go: there was no plan
+            return
         times: Array = self._dt * np.arange(self._every, dtype=float)
         for values, motion in zip(self._motions, followed_motion(now, state, times), strict=True):
             values[i] = motion
         tried, p = now.attempt, k // self._every
-        self.log.outcome[i, p] = OUTCOMES.index(now.outcome)
         change = tried.changes[-1] if tried.changes else np.nan
         self.log.residual[i, p], self.log.change[i, p], self.log.ms[i, p] = tried.residual, change, 1e3 * tried.seconds
         self.log.motion_defect[i, p], self.log.stick_defect[i, p] = tried.motion_defect, tried.stick_defect
@@ -222,7 +229,8 @@ class HorizonControl:
             said = {
                 "planned": "planning again",
                 "shifted": why + "following the last plan",
-                "holding": why + "no plan to follow, holding or setting down within bounds",
+                "holding": why + "no plan to follow, holding or lowering within bounds",
+                "released": "set down and let go",
             }
             self.events.append(Event(i, k * self._dt, said[now.outcome]))
 

@@ -1,0 +1,133 @@
+"""Wrench problems within bounds: against another modelling layer, and what is given up where they are too small."""
+
+import cvxpy as cp
+import numpy as np
+import pytest
+from pivoting.controller import Body, Contact, Law, Motion, WrenchBounds, WrenchController, solve
+from pivoting.controller.bounded import BREAK, GIVE_UP, BoundedSolver
+
+G = 10.0
+
+
+def planar() -> WrenchController:
+    """The notes' block."""
+    return WrenchController(Body(1.0, 1.0 / 6.0), [Contact([-0.5, -0.5], 0.3)], Law.dynamic(), [0.0, -G], margin=1 / 6)
+
+
+def spatial(contacts: int = 2) -> WrenchController:
+    """A block on an edge, or on a vertex."""
+    points = [[-0.5, -0.35, -0.7], [-0.5, 0.35, -0.7]][:contacts]
+    body = Body(2.0, np.diag([0.4, 0.5, 0.3]))
+    return WrenchController(body, [Contact(p, 0.5, 0.2) for p in points], Law.dynamic(), [0.0, 0.0, -G], margin=0.1)
+
+
+def tilted(angle: float) -> np.ndarray:
+    """Turned about -y."""
+    return np.array([np.cos(0.5 * angle), 0.0, -np.sin(0.5 * angle), 0.0])
+
+
+CASES = [(planar(), "plane"), (spatial(), "edge"), (spatial(1), "vertex")]
+BOUNDS = {
+    "wide": WrenchBounds(),
+    "force": WrenchBounds(force=6.0),
+    "moment": WrenchBounds(moment=0.9),
+    "both": WrenchBounds(force=4.0, moment=0.5),
+    "tiny": WrenchBounds(force=0.5, moment=0.5),
+    "rates": WrenchBounds(force=20.0, force_rate=30.0, moment_rate=20.0),
+}
+
+
+def stated(controller: WrenchController, angle: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Orientation, Jacobian and required wrench at rest."""
+    q = tilted(angle)
+    problem = controller.problem(Motion(angle) if controller.space.dim == 2 else Motion(q, np.zeros(3)))
+    return q, problem.jacobian, problem.required
+
+
+@pytest.mark.parametrize("name", BOUNDS)
+@pytest.mark.parametrize(("controller", "kind"), CASES, ids=[kind for _, kind in CASES])
+def test_another_modelling_layer_agrees(controller: WrenchController, kind: str, name: str) -> None:
+    """In units of the weight and the lever, as the penalties are."""
+    bounds, dt = BOUNDS[name], 0.05
+    q, J, required = stated(controller, 0.3)
+    dim, nw, n = controller.space.dim, *J.shape
+    before = np.linspace(-0.4, 0.4, nw)
+    answer = BoundedSolver(controller, bounds, dt)(q, required, before)
+    weight, lever = controller.body.mass * G, np.linalg.norm(controller.belief.pivot)
+    unit = weight * np.array([1.0] * dim + [lever] * (nw - dim))
+    f, w, s = cp.Variable(n), cp.Variable(nw), cp.Variable(nw)
+    # of a turn about the contacts: everywhere about a vertex, about the edge, in the plane
+    axes = {"plane": [[0.0, -1.0, 0.0]], "edge": [[0.0, 1.0, 0.0]], "vertex": np.eye(3)}[kind]
+    arm, inertia = -controller.belief.pivot, controller.belief.inertia
+    moves = [np.r_[controller.body.mass * np.cross(e, arm), inertia @ np.asarray(e, dtype=float)] for e in axes]
+    B = controller.belief.wrench_map @ np.array(moves).T / unit[:, None]
+    B /= np.abs(B).max()
+    a = cp.Variable(B.shape[1])
+    limits = [(J @ f * weight + cp.multiply(unit, w - B @ a - s) - required) / unit == 0]
+    for i, contact in enumerate(controller.contacts):
+        own = f[dim * i : dim * (i + 1)]
+        limits += [own[-1] >= contact.f_min / weight]
+        limits += [cp.norm(own[:-1]) <= controller.belief.mu[i] * own[-1]]
+    F, M = weight * w[:dim], weight * lever * w[dim:]
+    for value, most in ((F, bounds.force), (M, bounds.moment)):
+        limits += [cp.norm(value) <= most] if np.isfinite(most) else []
+    for value, old, most in ((F, before[:dim], bounds.force_rate), (M, before[dim:], bounds.moment_rate)):
+        limits += [cp.norm(value - old) <= most * dt] if np.isfinite(most) else []
+    Q_w = unit[:, None] * controller.Q_w * unit / weight**2
+    cost = 0.5 * cp.quad_form(w, Q_w) + 0.5 * cp.quad_form(f, controller.Q_f)
+    problem = cp.Problem(cp.Minimize(cost + GIVE_UP * cp.norm(a) + BREAK * cp.norm(s)), limits)
+    problem.solve(solver=cp.CLARABEL, tol_gap_abs=1e-10, tol_gap_rel=1e-10, tol_feas=1e-9)
+    np.testing.assert_allclose(answer.wrench / unit, w.value, atol=1e-6)
+    np.testing.assert_allclose(answer.force.ravel() / weight, f.value, atol=1e-6)
+    np.testing.assert_allclose(answer.lacking / unit, -(B @ a.value + s.value), atol=1e-6)
+    assert answer.residual < 1e-8
+    assert bounds.excess(answer.wrench, before, dt) < 1e-8
+    assert answer.exact == (np.abs(answer.lacking / unit).max() < 1e-6)
+
+
+@pytest.mark.parametrize(("controller", "kind"), CASES, ids=[kind for _, kind in CASES])
+def test_wide_bounds_change_nothing(controller: WrenchController, kind: str) -> None:
+    q, _, required = stated(controller, 0.2)
+    problem = controller.problem(Motion(0.2) if controller.space.dim == 2 else Motion(q, np.zeros(3)))
+    smallest = solve(problem)
+    answer = BoundedSolver(controller, WrenchBounds(force=100.0, moment=100.0), 1e-3)(q, required)
+    assert answer.exact
+    np.testing.assert_allclose(answer.wrench, smallest.wrench, atol=1e-6 * np.abs(required).max())
+    np.testing.assert_allclose(answer.force, smallest.force, atol=1e-6 * np.abs(required).max())
+
+
+def test_what_is_given_up_is_a_turn_about_the_contact_where_that_is_enough() -> None:
+    """A force that is too small to hold the block lets it turn about its corner, not slide or lift."""
+    controller = planar()
+    q, _, required = stated(controller, np.deg2rad(40.0))
+    answer = BoundedSolver(controller, WrenchBounds(force=0.3, moment=0.1), 1e-3)(q, required)
+    assert not answer.exact
+    turn = np.r_[np.cross([0.0, -1.0, 0.0], -controller.belief.pivot)[[0, 2]], 1.0 / 6.0]
+    np.testing.assert_allclose(answer.lacking, answer.lacking[2] / turn[2] * turn, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("argument", "message"),
+    [
+        ({"force": 0.0}, "force = 0.0: must be > 0"),
+        ({"moment": -1.0}, "moment = -1.0: must be > 0"),
+        ({"force_rate": "fast"}, "force_rate = 'fast': must be > 0"),
+        ({"moment_rate": float("nan")}, "moment_rate = nan: must be > 0"),
+        ({"component": [1.0, 2.0]}, "component = .*: must be 3 .plane. or 6"),
+        ({"component": [1.0, 2.0, 0.0]}, "component = .*: must be 3 .plane. or 6"),
+    ],
+)
+def test_bounds_that_are_none_are_refused(argument: dict, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        WrenchBounds(**argument)
+
+
+def test_excess_is_relative_to_the_bound() -> None:
+    bounds = WrenchBounds(force=5.0, component=[4.0, np.inf, 1.0], force_rate=10.0)
+    assert bounds.any
+    assert not WrenchBounds().any
+    assert bounds.excess(np.array([3.0, 4.0, 0.5])) == pytest.approx(0.0)
+    assert bounds.excess(np.array([3.0, 4.0, 1.5])) == pytest.approx(0.5)
+    assert bounds.excess(np.array([3.0, 4.0, 0.5]), np.zeros(3), 0.25) == pytest.approx(1.0)
+    with pytest.raises(ValueError, match="component"):
+        bounds.balls(6)
