@@ -40,6 +40,8 @@ def main(
     *,
     floors: dict[str, float] | None = None,
     markdown: Callable[[dict[str, float]], str] | None = None,
+    draw: Callable[[dict[str, float], Path], None] | None = None,
+    brief: Callable[[str], bool] = lambda name: True,
 ) -> None:
     """Run a benchmark from the command line.
 
@@ -49,6 +51,8 @@ def main(
         bounds: greatest value of a figure that is asked for; the exit code is 1 if one is exceeded.
         floors: least value of a figure that is asked for; likewise.
         markdown: renders the figures of a saved run, for `--markdown FILE`.
+        draw: draws them into a picture, for `--figure FILE PICTURE`.
+        brief: which figures are printed; all are saved.
     """
     floors = floors or {}
     parser = argparse.ArgumentParser(description=description)
@@ -59,15 +63,24 @@ def main(
         parser.add_argument(
             "--markdown", type=Path, metavar="FILE", help="print a saved run as tables, measure nothing"
         )
+    if draw is not None:
+        parser.add_argument(
+            "--figure", type=Path, nargs=2, metavar=("FILE", "PICTURE"), help="draw a saved run, measure nothing"
+        )
     args = parser.parse_args()
+    if draw is not None and args.figure is not None:
+        draw(_figures(parser, "--figure", args.figure[0]), args.figure[1])
+        return
     if markdown is not None and args.markdown is not None:
         print(markdown(_figures(parser, "--markdown", args.markdown)))
         return
     saved = {} if args.compare is None else _figures(parser, "--compare", args.compare)
     figures = measure(args.quick)
-    width = max(map(len, figures))
+    width = max(len(name) for name in figures if brief(name))
     print(f"{'':{width}}  {'now':>10}" + (f"  {'saved':>10}" if saved else "") + "   asked")
     for name, value in figures.items():
+        if not brief(name):
+            continue
         row = f"{name:{width}}  {value:10.4g}"
         if saved:
             row += f"  {saved[name]:10.4g}" if name in saved else f"  {'-':>10}"

@@ -48,7 +48,7 @@ class WrenchController:
     Attributes:
         body: mass and inertia as believed.
         contacts: the contacts that are to stick, all planar or all spatial.
-        law: static, quasi-dynamic or dynamic.
+        law: static, quasi-dynamic (with the velocity or as in the notes) or dynamic.
         gravity: (d,) in world axes [m/s^2]; in the plane (x, z), or (3,) for a plane that is not x-z.
         base: (4,) quaternion of the table in the world, for planar contacts; theta is measured from the table.
         margin: share of mu kept unused.

@@ -41,8 +41,8 @@ class Horizon:
         controller: the belief about object, contacts, friction (its margin included), gravity and weights Q_w, Q_f.
         steps: N.  h: length of a step [s].
         integrator: "quasi-dynamic" (the notes'), "implicit", "semi-implicit" or "forward"; see `transcription`.
-        Q: (nq, nq) weight on pose errors, (x, z, theta) in the plane, (translation in table axes, rotation vector in
-            object axes) in space; the notes' identity by default.
+        Q: (N, nq, nq) weights on pose errors, (x, z, theta) in the plane, (translation in table axes, rotation
+            vector in object axes) in space. One (nq, nq) serves every step; the notes' identity by default.
         bounds: on the wrench.
         stick: the contact points stay where they are; otherwise the desired arc merely suggests it.
         clear: (P, 3) points of the object, from the CoM in object axes, that stay on or above the table; with none
@@ -89,7 +89,7 @@ class Horizon:
         put(self, "steps", int(steps))
         put(self, "h", number("h", h, above=0.0, unit="s"))
         put(self, "integrator", integrator)
-        put(self, "Q", positive_definite("Q", np.eye(nw) if Q is None else Q, nw))
+        put(self, "Q", _weights(np.eye(nw) if Q is None else Q, int(steps), nw))
         put(self, "bounds", WrenchBounds() if bounds is None else bounds)
         put(self, "stick", bool(stick))
         put(self, "clear", array("clear", np.zeros((0, 3)) if clear is None else clear, (None, 3)))
@@ -150,3 +150,13 @@ class Horizon:
         """Desired poses in table axes, from (N, 3) and (N, 4) in world axes."""
         c, q = array("positions", positions, (self.steps, 3)), array("orientations", orientations, (self.steps, 4))
         return np.ascontiguousarray(c @ self.table), quaternion_product(self.controller.base * CONJUGATE, q)
+
+
+def _weights(Q: ArrayLike, steps: int, nq: int) -> Array:
+    """(N, nq, nq) from one weight for all steps or one for each."""
+    if np.ndim(Q) != 3:
+        return np.broadcast_to(positive_definite("Q", Q, nq), (steps, nq, nq))
+    each = array("Q", Q, (steps, nq, nq))
+    for t in range(steps):
+        positive_definite(f"Q[{t}]", each[t], nq)
+    return each

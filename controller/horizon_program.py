@@ -167,7 +167,7 @@ class HorizonProgram:
         """sum 1/2 w'Q_w w + 1/2 f'Q_f f + 1/2 e'Q e, in SI units, poses taken as they are."""
         belief, error = self._belief, self._tracking(guess.path, desired)[2]
         terms = ((guess.wrench, belief.Q_w), (guess.force, belief.Q_f), (error, self.horizon.Q))
-        return 0.5 * sum(float(((value @ weight) * value).sum()) for value, weight in terms)
+        return 0.5 * sum(float((value * (weight @ value[..., None])[..., 0]).sum()) for value, weight in terms)
 
     def _rows(self, guess: Guess) -> _Rows:
         horizon, body, N = self.horizon, self._body, self.horizon.steps

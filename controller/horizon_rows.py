@@ -83,7 +83,7 @@ def fill_tracking(body, Q, path, position, orientation, curvature, slope, error)
     """Write the errors (N, nq) from a path's poses to desired ones, and what 1/2 e'Q e is to second order in d_t.
 
     Args:
-        body: `Mechanics`.  Q: (nq, nq).
+        body: `Mechanics`.  Q: (N, nq, nq).
         position: (N, 3), orientation: (N, 4): desired, table axes.
         curvature: (N, nq, nq) and slope: (N, nq), out.  error: (N, nq), out.
     """
@@ -106,7 +106,7 @@ def fill_tracking(body, Q, path, position, orientation, curvature, slope, error)
             for c in range(nw):
                 QJ[r, c] = 0.0
                 for k in range(nw):
-                    QJ[r, c] += Q[r, k] * J[k, c]
+                    QJ[r, c] += Q[t, r, k] * J[k, c]
         for r in range(nw):
             slope[t, r] = 0.0
             for k in range(nw):

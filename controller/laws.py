@@ -9,7 +9,7 @@ from pivoting.controller.kernel import inlined
 from pivoting.controller.space import cross, into, rotation_error
 from pivoting.controller.validate import number, one_of, positive_definite
 
-FORMULATIONS = ("static", "quasi-dynamic", "dynamic")
+FORMULATIONS = ("static", "quasi-dynamic", "quasi-dynamic-velocity", "dynamic")
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,15 +35,17 @@ class Law:
     (m (a - g), I alpha + c omega x I omega) with a = alpha x rho + c omega x (omega x rho), rho from contact to CoM and
     c = 1 where velocities count. On a ball of radius s, which rolls, v = omega x (s n - R p) with the normal n at rest:
     alpha acts on rho = s n - R p and omega x (omega x .) on the part of it that turns, -R p.
-    The three formulations of the notes are three choices of these four coefficients:
+    The formulations of the notes are choices of these four coefficients:
 
     - static: all zero. What balances, J f + w + m g = 0; it does not correct errors.
     - quasi-dynamic: kp = 1/h^2, all else zero: M (q_d - q)/h^2 = J f + w + m g. On a second-order plant it oscillates
       (erratum 7), because the velocity that it assumes to be zero is not.
+    - quasi-dynamic-velocity: kd = 1/h besides. M (q_d(t + h) - q - h v)/h^2 = J f + w + m g, with q_d(t + h) to first
+      order in h: the velocity counts where it moves the pose, and still not in the forces (c = 0).
     - dynamic: the reference's acceleration, feedback on angle and rate, and the velocity terms.
 
     Attributes:
-        formulation: "static", "quasi-dynamic" or "dynamic".
+        formulation: one of `FORMULATIONS`.
         kp: [1/s^2].  kd: [1/s].  feedforward: 0 or 1.  velocity_terms: c, 0 or 1.
     """
 
@@ -64,9 +66,16 @@ class Law:
         return cls("static", 0.0, 0.0, 0.0, 0.0)
 
     @classmethod
-    def quasi_dynamic(cls, h: float) -> Self:
-        """The notes' quasi-dynamic motion with step `h` [s], tracking met exactly (dead beat) rather than weighed."""
-        return cls("quasi-dynamic", number("h", h, above=0.0, unit="s") ** -2, 0.0, 0.0, 0.0)
+    def quasi_dynamic(cls, h: float, *, velocity: bool = False) -> Self:
+        """The notes' quasi-dynamic motion with step `h` [s], tracking met exactly (dead beat) rather than weighed.
+
+        Args:
+            velocity: the step starts with the velocity that the object has, not from rest; see erratum 7.
+        """
+        kp = number("h", h, above=0.0, unit="s") ** -2
+        if velocity:
+            return cls("quasi-dynamic-velocity", kp, 1.0 / h, 0.0, 0.0)
+        return cls("quasi-dynamic", kp, 0.0, 0.0, 0.0)
 
     @classmethod
     def dynamic(cls, bandwidth: float = 40.0, damping: float = 1.0) -> Self:

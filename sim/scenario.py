@@ -39,7 +39,7 @@ class Scenario:
         reference: "constant" (stay at theta for seconds), "arc" (theta to theta_end in seconds, at rest for hold before
             and after), "return" (an arc and back), "sine" (theta + amplitude sin, for seconds); from Python also any
             `Reference`, for seconds.
-        law: "static", "quasi-dynamic", "dynamic".  bandwidth [rad/s], damping: of the dynamic law.
+        law: of `controller.laws.FORMULATIONS`.  bandwidth [rad/s] (1/h of a quasi-dynamic law), damping: of the law.
         margin: share of mu kept unused.  f_min: normal-force floor [N].
         length: characteristic length of Q_w [m]; None: the lever of the contact.
         force_max [N], moment_max [N m], force_rate [N/s], moment_rate [N m/s]: bounds on the wrench, in object axes;
@@ -174,11 +174,11 @@ class Scenario:
         return " ".join([self.name, *(f"{key}={value}" for key, value in self.changes.items())])
 
     def control_law(self) -> Law:
-        """The law; the quasi-dynamic one takes the time constant of `bandwidth` as its step h."""
+        """The law; the quasi-dynamic ones take the time constant of `bandwidth` as their step h."""
         if self.law == "static":
             return Law.static()
-        if self.law == "quasi-dynamic":
-            return Law.quasi_dynamic(1.0 / self.bandwidth)
+        if self.law.startswith("quasi-dynamic"):
+            return Law.quasi_dynamic(1.0 / self.bandwidth, velocity=self.law == "quasi-dynamic-velocity")
         return Law.dynamic(self.bandwidth, self.damping)
 
     def bounds(self) -> WrenchBounds:

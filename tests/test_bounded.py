@@ -1,5 +1,7 @@
 """Wrench problems within bounds: against another modelling layer, and what is given up where they are too small."""
 
+import warnings
+
 import cvxpy as cp
 import numpy as np
 import pytest
@@ -79,7 +81,9 @@ def test_another_modelling_layer_agrees(controller: WrenchController, kind: str,
     Q_w = unit[:, None] * controller.Q_w * unit / weight**2
     cost = 0.5 * cp.quad_form(w, Q_w) + 0.5 * cp.quad_form(f, controller.Q_f)
     problem = cp.Problem(cp.Minimize(cost + GIVE_UP * cp.norm(a) + BREAK * cp.norm(s)), limits)
-    problem.solve(solver=cp.CLARABEL, tol_gap_abs=1e-9, tol_gap_rel=1e-9, tol_feas=1e-9)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Solution may be inaccurate")  # how inaccurate, is what follows
+        problem.solve(solver=cp.CLARABEL, tol_gap_abs=1e-9, tol_gap_rel=1e-9, tol_feas=1e-9)
     np.testing.assert_allclose(answer.wrench / unit, w.value, atol=3e-5)
     np.testing.assert_allclose(answer.force.ravel() / weight, f.value, atol=3e-5)
     np.testing.assert_allclose(answer.lacking / unit, -(B @ a.value + s.value), atol=3e-5)
