@@ -116,6 +116,8 @@ class Planner:
             inside += answer.seconds
             residual, said = kkt_residual(program, answer), answer.said
             if not residual <= RESIDUAL:
+                if self.method != "clarabel":  # not every backend tells why it has no answer
+                    said += f"; clarabel: {solver('clarabel')(program).said}"
                 infeasible = "infeasible" in said.lower()
                 status = "infeasible" if infeasible else "failed"
                 break
