@@ -155,15 +155,15 @@ def test_bounds_are_never_exceeded(dim: int) -> None:
     assert min(met[name] for name in ("force", "moment", "rate")) >= 1, met
 
 
-def block(dim: int = 2, **options: object) -> tuple[WrenchController, BodyState]:
-    """1 m, 1 kg, its corner or edge on a rough table, turned by 10 degrees about it; 10 m/s^2."""
+def block(dim: int = 2, mu: float = 1.0) -> tuple[WrenchController, BodyState]:
+    """1 m, 1 kg, its corner or edge on the table, turned by 10 degrees about it; 10 m/s^2."""
     theta = np.deg2rad(10.0)
     if dim == 2:
-        contacts, inertia, gravity = [Contact((-0.5, -0.5), 1.0)], 1.0 / 6.0, (0.0, -10.0)
+        contacts, inertia, gravity = [Contact((-0.5, -0.5), mu)], 1.0 / 6.0, (0.0, -10.0)
     else:
-        contacts = [Contact((-0.5, side, -0.5), 1.0) for side in (-0.5, 0.5)]
+        contacts = [Contact((-0.5, side, -0.5), mu) for side in (-0.5, 0.5)]
         inertia, gravity = np.eye(3) / 6.0, (0.0, 0.0, -10.0)
-    controller = WrenchController(Body(1.0, inertia), contacts, Law.static(), gravity, **options)
+    controller = WrenchController(Body(1.0, inertia), contacts, Law.static(), gravity)
     c, s = np.cos(theta), np.sin(theta)
     centre = np.array([0.5 * (c - s), 0.0, 0.5 * (c + s)])
     return controller, BodyState(centre, turn(theta), np.zeros(3), np.zeros(3))
