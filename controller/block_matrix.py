@@ -55,7 +55,7 @@ class BlockMatrix:
     def filled(self, values: list[Array]) -> Sparse:
         """The matrix, from one array (S, r, c) for each part."""
         data = np.empty(len(self._indices))
-        for slots, entries, block in zip(self._slots, self._entries, values, strict=True):
-            if len(entries):
-                data[slots] = block.reshape(len(block), -1)[:, entries].ravel()
+        for slots, entries, mask, block in zip(self._slots, self._entries, self._masks, values, strict=True):
+            if len(entries):  # no blocks at all, where N = 1 and they belong to the step before, are (0, r c)
+                data[slots] = block.reshape(-1, mask.size)[:, entries].ravel()
         return Sparse(data, self._indices, self._indptr, self.shape)

@@ -47,7 +47,10 @@ class WrenchBounds:
             object.__setattr__(self, name, float(value))
         each = None
         if component is not None:
-            each = np.array(component, dtype=float)
+            try:
+                each = np.array(component, dtype=float)
+            except (TypeError, ValueError):  # text, ragged
+                each = np.zeros(0)
             if each.shape not in ((3,), (6,)) or not (each > 0.0).all():
                 raise fail("component", component, "3 (plane) or 6 (space) numbers > 0, or inf for no bound")
             each.flags.writeable = False

@@ -15,11 +15,16 @@ from pivoting.controller.kernel import kernel
 from pivoting.controller.validate import Array, fail
 from scipy import sparse
 
+# An answer is off by the square root of its gap: 1e-10 leaves contact forces 1e-5 of the weight from the optimum.
+_TIGHT = {
+    "tol_gap_abs": 1e-12,
+    "tol_gap_rel": 1e-12,
+    "tol_feas": 1e-10,
+    "static_regularization_constant": 1e-11,  # at its own 1e-8 it gives up where sticking leaves no freedom
+}
 _CLARABEL = {
     **CLARABEL,
-    "tol_gap_abs": 1e-10,
-    "tol_gap_rel": 1e-10,
-    "tol_feas": 1e-10,
+    **_TIGHT,
     # what an update in place needs: the pattern that it was set up with
     "max_threads": 1,
     "presolve_enable": False,
@@ -27,8 +32,15 @@ _CLARABEL = {
     "input_sparse_dropzeros": False,
 }
 _QP: dict[str, dict[str, Any]] = {
-    "piqp": {"eps_abs": 1e-10, "eps_rel": 1e-10},
-    "clarabel": {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10, "max_step_fraction": 0.95},
+    "piqp": {
+        "eps_abs": 1e-10,
+        "eps_rel": 1e-10,
+        "eps_duality_gap_abs": 1e-12,
+        "eps_duality_gap_rel": 1e-12,
+        "eps_primal_inf": 1e-10,  # its own 1e-4 calls programs infeasible whose guess is far off
+        "eps_dual_inf": 1e-10,
+    },
+    "clarabel": {**_TIGHT, "max_step_fraction": 0.95},
     "osqp": {"eps_abs": 1e-9, "eps_rel": 1e-9, "polishing": True, "max_iter": 100_000},
     "proxqp": {"eps_abs": 1e-10, "eps_rel": 0.0},
     "scs": {"eps_abs": 1e-9, "eps_rel": 1e-9},

@@ -19,7 +19,7 @@ from pivoting.controller.polygon import polygon
 from pivoting.controller.so3 import CONJUGATE, exponential, rotated
 from pivoting.controller.space import quaternion_product, rotation_matrix
 from pivoting.controller.transcription import INTEGRATORS, Path
-from pivoting.controller.validate import Array, array, fail, number, one_of, positive_definite
+from pivoting.controller.validate import Array, array, fail, number, one_of, positive_definite, unit_quaternions
 
 EDGES = 16  # of the polygon in which a QP keeps a planar force: up to 1 - cos(pi / 16) = 2 % of a bound is unused
 
@@ -83,7 +83,10 @@ class Horizon:
         one_of("integrator", integrator, tuple(INTEGRATORS))
         if bounds is not None and not isinstance(bounds, WrenchBounds):
             raise fail("bounds", bounds, "WrenchBounds")
+        if not isinstance(stick, bool | np.bool_):
+            raise fail("stick", stick, "True or False")
         nw = len(controller.Q_w)
+        disc = edges == 0 and not isinstance(edges, bool)
         put = object.__setattr__
         put(self, "controller", controller)
         put(self, "steps", int(steps))
@@ -93,7 +96,7 @@ class Horizon:
         put(self, "bounds", WrenchBounds() if bounds is None else bounds)
         put(self, "stick", bool(stick))
         put(self, "clear", array("clear", np.zeros((0, 3)) if clear is None else clear, (None, 3)))
-        put(self, "edges", 0 if edges == 0 or controller.space.dim == 3 else len(polygon(edges).facets))
+        put(self, "edges", 0 if disc or controller.space.dim == 3 else len(polygon(edges).facets))
         self.bounds.balls(nw)  # says what is wrong with them
 
     @property
@@ -115,11 +118,11 @@ class Horizon:
 
     def start(self, state: BodyState) -> Path:
         """Pose 0 alone, in table axes, and how it is reached; see `Path`."""
-        base = self.controller.base * CONJUGATE
-        position = self.table.T @ np.asarray(state.position, dtype=float)
-        orientation = quaternion_product(base, np.asarray(state.orientation, dtype=float))
-        spin = rotated(np.asarray(state.orientation) * CONJUGATE, np.asarray(state.angular_velocity, dtype=float))
-        rates = np.concatenate([self.table.T @ np.asarray(state.velocity, dtype=float), spin])
+        where, at = array("position", state.position, (3,)), unit_quaternions("orientation", state.orientation, (4,))
+        velocity, omega = (array(name, getattr(state, name), (3,)) for name in ("velocity", "angular_velocity"))
+        position = self.table.T @ where
+        orientation = quaternion_product(self.controller.base * CONJUGATE, at)
+        rates = np.concatenate([self.table.T @ velocity, rotated(at * CONJUGATE, omega)])
         kept = self.controller.belief.wrench_map
         arriving = self.h * (kept.T @ (kept @ rates))
         before = np.concatenate([position, orientation])
@@ -141,14 +144,15 @@ class Horizon:
         Args:
             orientations: (N, 4) quaternions object to world.
         """
-        q = array("orientations", orientations, (self.steps, 4))
+        q = unit_quaternions("orientations", orientations, (self.steps, 4))
         pivot = self.controller.belief.pivot
         there = np.asarray(state.position) + rotated(np.asarray(state.orientation), pivot)
         return there - rotated(q, pivot), q
 
     def desired(self, positions: ArrayLike, orientations: ArrayLike) -> tuple[Array, Array]:
         """Desired poses in table axes, from (N, 3) and (N, 4) in world axes."""
-        c, q = array("positions", positions, (self.steps, 3)), array("orientations", orientations, (self.steps, 4))
+        c = array("positions", positions, (self.steps, 3))
+        q = unit_quaternions("orientations", orientations, (self.steps, 4))
         return np.ascontiguousarray(c @ self.table), quaternion_product(self.controller.base * CONJUGATE, q)
 
 

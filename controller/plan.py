@@ -9,7 +9,7 @@ from pivoting.controller.horizon import BodyState, Horizon
 from pivoting.controller.horizon_program import Guess, HorizonProgram
 from pivoting.controller.so3 import fill_differences, rotated
 from pivoting.controller.space import quaternion_product
-from pivoting.controller.validate import Array, fail, number
+from pivoting.controller.validate import Array, array, fail, number
 
 RESIDUAL = 1e-6  # relative KKT residual of a pass's program up to which its answer is taken
 CONVERGED = 1e-9  # change of a pass, in weights, levers and radians
@@ -78,6 +78,8 @@ class Planner:
     """
 
     def __init__(self, horizon: Horizon, method: str | None = None, **options: object):
+        if not isinstance(horizon, Horizon):
+            raise fail("horizon", horizon, "a Horizon")
         self.horizon = horizon
         self.program = HorizonProgram(horizon)
         cones = bool(self.program.cones.orders)
@@ -117,6 +119,10 @@ class Planner:
         number("tolerance", tolerance, above=0.0)
         if isinstance(passes, bool) or not isinstance(passes, int) or passes < 1:
             raise fail("passes", passes, "a whole number >= 1")
+        if guess is not None and not isinstance(guess, Guess):
+            raise fail("guess", guess, "a Guess, as `Plan.guess` or `Planner.guess` is")
+        if applied is not None:
+            applied = array("applied", applied, (len(self.horizon.controller.Q_w),))
         began = perf_counter()
         wanted = self.horizon.desired(*desired)
         now = self.guess(state, wanted) if guess is None else guess

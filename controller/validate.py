@@ -34,6 +34,14 @@ def array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
     return out
 
 
+def unit_quaternions(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
+    """The same for quaternions of unit length, the last axis of `shape`, to 1e-6."""
+    out = array(name, value, shape)
+    if (np.abs(np.sqrt((out * out).sum(axis=-1)) - 1.0) > 1e-6).any():
+        raise fail(name, out, "a unit quaternion (w, x, y, z)" + (" in each row" if out.ndim > 1 else ""))
+    return out
+
+
 def number(
     name: str,
     value: float,
