@@ -17,7 +17,8 @@ from pivoting.controller.transcription import INTEGRATORS
 Array = NDArray[np.float64]
 TOLERANCE = 1e-9  # relative KKT residual of an answer that counts as solved
 OVER = 1e-9  # of a bound: a wrench that exceeds it by more is solved for again, within bounds
-BOUNDED, FAILED = STATUS.index("bounded"), STATUS.index("failed")
+USABLE = 1e-3  # relative KKT residual within bounds: a poorer answer than asked is better than none
+BOUNDED, INACCURATE, FAILED = (STATUS.index(word) for word in ("bounded", "inaccurate", "failed"))
 
 
 class States(NamedTuple):
@@ -88,11 +89,13 @@ class BoundedControl:
                 continue
             jacobian = self._controller.jacobian(states.orientation[i])
             answer = self._solve(states.orientation[i], jacobian @ out.force[i] + out.wrench[i], last)
-            if not answer.residual <= 1e-6:
+            if not answer.residual <= USABLE:
                 out.wrench[i], out.status[i] = np.nan, FAILED
                 continue
             out.wrench[i], out.force[i], out.residual[i] = answer.wrench, answer.force.ravel(), answer.residual
-            if not answer.exact:
+            if answer.residual > 1e-6:
+                out.status[i] = INACCURATE
+            elif not answer.exact:
                 out.status[i] = BOUNDED
 
     def prepare(self, states: States, out: Answers) -> None:

@@ -165,8 +165,9 @@ class Equations:
     def objective(self, poses: Poses, w: np.ndarray, f: np.ndarray) -> float:
         """sum 1/2 w'Q_w w + 1/2 f'Q_f f + 1/2 e'Q e."""
         mine, flat = self.horizon.controller, f.reshape(self.N, -1)
-        terms = (w, mine.Q_w), (flat, mine.Q_f), (self.terms(poses, w, f).error, self.horizon.Q)
-        return 0.5 * sum(float(np.einsum("ti,ij,tj", value, weight, value)) for value, weight in terms)
+        error = self.terms(poses, w, f).error
+        effort = sum(float(np.einsum("ti,ij,tj", value, Q, value)) for value, Q in ((w, mine.Q_w), (flat, mine.Q_f)))
+        return 0.5 * (effort + float(np.einsum("ti,tij,tj", error, self.horizon.Q, error)))
 
     def linearised(self, guess: Poses, x: np.ndarray) -> tuple[Terms, Terms]:
         """Values of the terms at a guess x (n,) about poses, each flat, and their derivatives (., n) by differences."""
@@ -231,12 +232,12 @@ def solved(eq: Equations, guess: Poses, w: np.ndarray, f: np.ndarray, applied: n
     # 1/2 |C x + c|^2, from the Cholesky factors of the weights
     error = value.error - by.error @ at
     unit = np.diag(eq.units)
-    blocks = [block_diag(0.0 * horizon.Q, mine.Q_w, mine.Q_f)] * eq.N
+    blocks = [block_diag(0.0 * horizon.Q[0], mine.Q_w, mine.Q_f)] * eq.N
     heavy = np.kron(np.eye(eq.N), unit) @ block_diag(*blocks) @ np.kron(np.eye(eq.N), unit)
     kept = np.flatnonzero(np.diag(heavy))
     C = np.zeros((len(kept), len(at)))
     C[:, kept] = np.linalg.cholesky(heavy[np.ix_(kept, kept)]).T
-    D = np.kron(np.eye(eq.N), np.linalg.cholesky(horizon.Q).T)
+    D = block_diag(*(np.linalg.cholesky(Q).T for Q in horizon.Q))
     cost = cp.sum_squares(C @ x / eq.weight) + cp.sum_squares((D @ by.error @ x + D @ error) / eq.weight)
     problem = cp.Problem(cp.Minimize(0.5 * cost), must)
     routes = [
