@@ -19,6 +19,7 @@ from pivoting.controller.so3 import CONJUGATE, rotated
 from pivoting.controller.validate import Array, number
 
 GIVE_UP, BREAK = 1e2, 1e4  # rho_a and rho_s, in weights: far above any multiplier of an answer that is worth having
+POOR = 1e-8  # relative KKT residual
 EXACT = 1e-6  # of the weight: less than this is nothing given up
 
 
@@ -118,11 +119,17 @@ class BoundedSolver:
         ]
         program = ConicProgram(self._P, self._q, _one(rows, self._mask), np.concatenate(b), self._cones)
         answer = self._solve(program)
+        residual = kkt_residual(program, answer)
+        if not residual <= POOR:  # scaled for another problem: begin anew, and keep the better of the two
+            again = ClarabelInPlace()(program)
+            better = kkt_residual(program, again)
+            if better < residual or not np.isfinite(residual):
+                answer, residual = again, better
         force, wrench = answer.x[:n] * self._unit, answer.x[n : n + nw] * self._scale
         lacking = required - jacobian @ force - wrench
         exact = bool(np.abs(lacking / self._scale).max() <= EXACT)
         return BoundedWrench(
-            wrench, force.reshape(len(self._belief.mu), -1), lacking, kkt_residual(program, answer), exact
+            wrench, force.reshape(len(self._belief.mu), -1), lacking, residual, exact
         )  # fmt: skip
 
     def _turning(self, orientation: Array) -> Array:
