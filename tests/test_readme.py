@@ -4,6 +4,8 @@ import contextlib
 import io
 import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -67,8 +69,22 @@ def test_agreement_with_clarabel_is_the_committed_one() -> None:
     assert f"KKT residual {max(figures[name + 'greatest KKT residual'] for name in names):.1e}." in TEXT
 
 
+@pytest.mark.parametrize("study", ["formulations", "effort"])
+def test_the_studys_tables_are_those_of_its_results(study: str) -> None:
+    benchmarks = ROOT / "benchmarks"
+    call = [benchmarks / f"bench_{study}.py", "--markdown", benchmarks / f"results/{study}.json"]
+    tables = subprocess.run([sys.executable, *call], capture_output=True, text=True, check=True).stdout
+    page = (ROOT / "docs/formulations.md").read_text()
+    for table in tables.strip().split("\n\n"):
+        assert table in page
+    for row in re.findall(r"^\| ([\w, -]+) \| (\S+|< \S+) \| (\S+|< \S+) \|$", TEXT, flags=re.MULTILINE):
+        if study == "formulations" and f"| {row[0]} |" in tables:
+            shown = next(line for line in tables.splitlines() if line.startswith(f"| {row[0]} |")).split(" | ")
+            assert (shown[2], shown[4].removesuffix(" |")) == row[1:], row
+
+
 def test_recorded_evidence_is_within_its_bounds() -> None:
-    for name in ("evidence", "evidence_space", "loop"):
+    for name in ("evidence", "evidence_space", "loop", "formulations", "effort"):
         saved = json.loads((ROOT / f"benchmarks/results/{name}.json").read_text())
         assert saved["quick"] is False
         assert {"processor", "cores", "python", "versions"} <= set(saved["machine"])
