@@ -56,8 +56,12 @@ def fleets(worlds: int) -> dict[str, float]:
             "friction_use_max",
             "force_mismatch_rel",
             "residual_max",
+            *(("plans_failed", "plan_residual_max", "bounded_steps") if "plans" in summary else ()),
         ):
-            out[f"{name}: {key}"] = summary[key]
+            out[f"{name}: {key}"] = float(summary[key])
+        bounds = run.scenario.bounds()
+        if bounds.any:
+            out[f"{name}: wrench above its bounds, of these"] = bounds.excess(run.wrench)
         out[f"{name}: failed worlds"] = float(len(summary["failed_worlds"]))
     return out
 
@@ -80,5 +84,7 @@ if __name__ == "__main__":
         **{f"{name}: angle_error_rms_deg": 0.05 for name in SCENARIOS if name.endswith("3d")},
         **{f"{name}: force_mismatch_rel": 0.03 for name in SCENARIOS if name.endswith("3d")},
         **{f"{name}: contact_lost_s": 0.0 for name in SCENARIOS},
+        **{f"mpc-{dim}: wrench above its bounds, of these": 1e-6 for dim in ("2d", "3d")},
+        **{f"mpc-{dim}: plans_failed": 0.0 for dim in ("2d", "3d")},
     }
     main(__doc__ or "", measure, bounds)

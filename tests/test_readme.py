@@ -28,7 +28,7 @@ def test_code_prints_what_is_shown(code: str, printed: str) -> None:
 
 
 def test_there_is_code_and_every_block_shows_its_output() -> None:
-    assert len(BLOCKS) == TEXT.count("```python") == 3
+    assert len(BLOCKS) == TEXT.count("```python") == 4
 
 
 def test_links_and_pictures_exist() -> None:
