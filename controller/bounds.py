@@ -77,9 +77,8 @@ class WrenchBounds:
     def excess(self, wrench: Array, before: Array | None = None, dt: float = 1.0) -> float:
         """By how much a wrench (nw,), or any of many (..., nw), exceeds a bound, relative to that bound; <= 0: none.
 
-        A wrench that is not a number gives nan, and so is within no bound.
-
-        `before`: likewise, the wrench applied `dt` [s] earlier; None leaves the rates out.
+        `before`: likewise, the wrench applied `dt` [s] earlier; None leaves the rates out. A wrench that is not a
+        number gives nan: it is within no bound.
         """
         worst = -1.0
         for ball in self.balls(wrench.shape[-1]):

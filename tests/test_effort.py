@@ -14,6 +14,7 @@ from pivoting.controller import (
     MinimumJerk,
     Plan,
     Planner,
+    WrenchBounds,
     WrenchController,
     WrenchProblem,
     solve,
@@ -95,3 +96,7 @@ def test_a_poor_answer_within_bounds_is_applied_and_said_to_be_poor(monkeypatch:
     assert np.isfinite(run.wrench).all()
     assert run.measures.unsolved_steps[0] > 0.0
     assert set(np.unique(run.status)) <= {0, 1}
+
+
+def test_no_wrench_at_all_is_within_no_bound() -> None:
+    assert np.isnan(WrenchBounds(force=1.0).excess(np.full((4, 3), np.nan)))
