@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 from pivoting.controller.kernel import inlined
-from pivoting.controller.space import cross, into
+from pivoting.controller.space import component, cross, into
 from pivoting.controller.validate import Array, array, fail, number
 
 
@@ -85,11 +85,4 @@ def fill_jacobian(R, points, offsets, frames, wrench_map, force_map, J):  # type
                     a2 += R[p, 2] * u
             m0, m1, m2 = cross(r0, r1, r2, a0, a1, a2)
             for row in range(wrench_map.shape[0]):
-                J[row, dim * i + j] = (
-                    wrench_map[row, 0] * a0
-                    + wrench_map[row, 1] * a1
-                    + wrench_map[row, 2] * a2
-                    + wrench_map[row, 3] * m0
-                    + wrench_map[row, 4] * m1
-                    + wrench_map[row, 5] * m2
-                )
+                J[row, dim * i + j] = component(wrench_map, row, a0, a1, a2, m0, m1, m2)

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 from pivoting.controller.kernel import inlined
-from pivoting.controller.space import cross, into, rotation_error
+from pivoting.controller.space import component, cross, into, rotation_error
 from pivoting.controller.validate import number, one_of, positive_definite
 
 FORMULATIONS = ("static", "quasi-dynamic", "quasi-dynamic-velocity", "dynamic")
@@ -129,11 +129,4 @@ def fill_required(R, q, omega, q_d, omega_d, alpha_d, law, mass, inertia, gravit
     M1 = inertia[1, 0] * a0 + inertia[1, 1] * a1 + inertia[1, 2] * a2 + c * k1
     M2 = inertia[2, 0] * a0 + inertia[2, 1] * a1 + inertia[2, 2] * a2 + c * k2
     for row in range(wrench_map.shape[0]):
-        out[row] = (
-            wrench_map[row, 0] * F0
-            + wrench_map[row, 1] * F1
-            + wrench_map[row, 2] * F2
-            + wrench_map[row, 3] * M0
-            + wrench_map[row, 4] * M1
-            + wrench_map[row, 5] * M2
-        )
+        out[row] = component(wrench_map, row, F0, F1, F2, M0, M1, M2)

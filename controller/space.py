@@ -153,6 +153,13 @@ def cross(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def component(wrench_map, row, F0, F1, F2, M0, M1, M2):  # type: ignore[no-untyped-def]
+    """One of the nw components that are used of a wrench (F, M) in 3-D."""
+    m = wrench_map[row]
+    return m[0] * F0 + m[1] * F1 + m[2] * F2 + m[3] * M0 + m[4] * M1 + m[5] * M2
+
+
+@kernel
 def into(R, a0, a1, a2):  # type: ignore[no-untyped-def]
     """R^T a: a world vector in object axes, as three scalars."""
     return (
