@@ -9,13 +9,14 @@ that both are zero where the bounds allow it, and s is where giving up a is enou
 from dataclasses import dataclass
 
 import numpy as np
-from pivoting.controller.block_matrix import BlockMatrix, Part, Sparse
+from pivoting.controller.block_matrix import BlockMatrix, Part
 from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.conic_program import ClarabelInPlace, Cones, ConicProgram, kkt_residual
 from pivoting.controller.contact_set import free_axes
 from pivoting.controller.controller import WrenchController
 from pivoting.controller.limits import friction_limits, wrench_limits
-from pivoting.controller.so3 import CONJUGATE, rotated
+from pivoting.controller.so3 import fill_hat
+from pivoting.controller.space import rotation_matrix
 from pivoting.controller.validate import Array, number
 
 GIVE_UP, BREAK = 1e2, 1e4  # rho_a and rho_s, in weights: far above any multiplier of an answer that is worth having
@@ -86,9 +87,8 @@ class BoundedSolver:
         P = np.zeros((wide, wide))
         P[np.ix_(f, f)] = belief.Q_f
         P[np.ix_(w, w)] = self._scale[:, None] * belief.Q_w * self._scale / self._unit**2
-        self._P = _one(np.triu(P), np.triu(P) != 0.0)
-        mask = self._rows != 0.0
-        self._mask = mask
+        self._P = _pattern(np.triu(P)).filled([np.triu(P)[None]])
+        self._A = _pattern(self._rows)
         self._q = np.zeros(wide)
         self._q[t_a], self._q[t_s] = GIVE_UP, BREAK
         self._solve = ClarabelInPlace()
@@ -117,7 +117,7 @@ class BoundedSolver:
             sides[1][0],
             rest,
         ]
-        program = ConicProgram(self._P, self._q, _one(rows, self._mask), np.concatenate(b), self._cones)
+        program = ConicProgram(self._P, self._q, self._A.filled([rows[None]]), np.concatenate(b), self._cones)
         answer = self._solve(program)
         residual = kkt_residual(program, answer)
         if not residual <= POOR:  # scaled for another problem: begin anew, and keep the better of the two
@@ -135,13 +135,14 @@ class BoundedSolver:
     def _turning(self, orientation: Array) -> Array:
         """(nw, A) B, the wrenches that accelerate the object about its free axes, with entries up to 1."""
         belief = self._belief
-        arm = -(belief.pivot + rotated(orientation * CONJUGATE, belief.offset))
-        push = np.hstack([belief.mass * np.cross(self._axes, arm), self._axes @ belief.inertia])
+        lever, hat = belief.pivot + rotation_matrix(orientation).T @ belief.offset, np.empty((3, 3))
+        fill_hat(*-lever, hat)
+        push = np.hstack([belief.mass * self._axes @ hat, self._axes @ belief.inertia])  # a x (-lever) = a hat(-lever)
         B = belief.wrench_map @ push.T / self._scale[:, None]
         return B / max(1e-300, float(np.abs(B).max(initial=0.0)))
 
 
-def _one(matrix: Array, mask: Array) -> Sparse:
-    """A matrix (r, c) as a sparse one, with every entry of the mask."""
+def _pattern(matrix: Array) -> BlockMatrix:
+    """Of a matrix (r, c), all of whose entries that may be other than zero are so."""
     r, c = matrix.shape
-    return BlockMatrix((r, c), [Part(np.arange(r)[None], np.arange(c)[None], mask != 0.0)]).filled([matrix[None]])
+    return BlockMatrix((r, c), [Part(np.arange(r)[None], np.arange(c)[None], matrix != 0.0)])
