@@ -19,11 +19,12 @@ check: $(STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-# The peers of bench_solve.py are the extra [bench]; those that are not there are skipped.
+# The peers of bench_solve.py and bench_horizon.py are the extra [bench]; those that are not there are skipped.
 bench: $(STAMP)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[dev,bench]'
 	$(BIN)/python benchmarks/bench_loop.py --json benchmarks/results/loop.json
 	$(BIN)/python benchmarks/bench_solve.py --json benchmarks/results/solve.json
+	$(BIN)/python benchmarks/bench_horizon.py --json benchmarks/results/horizon.json
 
 # 200,000 planar and 100,000 other random problems, 256 perturbed worlds of every scenario: minutes, so not in `make test`.
 evidence: $(STAMP)

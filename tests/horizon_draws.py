@@ -139,11 +139,7 @@ def placed(
     lever: float,
     units: np.ndarray,
 ) -> Case:
-    """Where the object is and goes, all within the plane of the table; the guess is as far off as the desired poses.
-
-    Where more than one contact sticks, the guess has to stick: about another one the linearised rows of all contacts
-    contradict each other, and which of them are kept is the planner's own choice.
-    """
+    """Where the object is and goes, all within the plane of the table; the guess is as far off as the desired poses."""
     K, dim, N, h = len(points), points.shape[1], horizon.steps, horizon.h
     lift = np.eye(3)[:, [0, 2]] if dim == 2 else np.eye(3)
 
@@ -169,7 +165,10 @@ def placed(
         return here + shift(0.2 * lever, N), quaternion(at * turn(rng, dim, size, N))
 
     desired = stuck(0.3) if horizon.stick else anywhere(0.3)
-    poses = stuck(0.2) if horizon.stick and K > 1 else anywhere(0.2)
+    tight = (
+        horizon.bounds.any or len(horizon.clear) > 0
+    )  # about poses that do not stick, few such programs have an answer
+    poses = stuck(0.2) if horizon.stick and K > 1 and (tight or chance(rng, 0.5)) else anywhere(0.2)
     wrench = rng.normal(size=(N, len(units))) * units
     force = rng.normal(size=(N, K * dim)) * units[0]
     applied = 0.3 * rng.normal(size=len(units)) * units if chance(rng, 0.5) else None

@@ -57,10 +57,11 @@ class Poses(NamedTuple):
 
 class Terms(NamedTuple):
     """What is to vanish (motion (..., N, nq) [N, N m], sticking (..., N, K d) [m]), errors (..., N, nq) and clearances
-    (..., N, P) [m], of any number of guesses at once."""
+    (..., N, P) [m], of any number of guesses at once; reduced (..., N, S) is sticking without saying anything twice."""
 
     motion: np.ndarray
     sticking: np.ndarray
+    reduced: np.ndarray
     error: np.ndarray
     height: np.ndarray
 
@@ -88,6 +89,10 @@ class Equations:
         middle = self.points.mean(axis=0)
         self.lever = np.linalg.norm(middle) or np.linalg.norm(self.points, axis=1).max()
         self.clear = horizon.clear @ lift
+        _, spread, axes = np.linalg.svd(self.points - middle)  # the contacts' directions, the widest spread first
+        rank = min(int(np.count_nonzero(spread > 1e-9 * self.lever)), d - 1)
+        rows = [(u, e) for e in range(rank) for u in range(e + 1, d)]  # axis e does not turn towards axis u
+        self.pairs = np.array([(axes[u], axes[e]) for u, e in rows]).reshape(-1, 2, d)
         self.desired = self.read(*desired)
         self.now = self.read(np.array([state.position]), np.array([state.orientation]))
         spin = np.asarray(state.angular_velocity)
@@ -154,9 +159,16 @@ class Equations:
         off = np.concatenate([error, rotation_between(poses.rotation, self.desired.rotation)], axis=-1)
         up = self.axes.T @ self.B[:, 2]
         height = self.places(poses, self.clear) @ up - (there @ up).min()
+        back = np.swapaxes(poses.rotation, -1, -2) @ self.now.rotation[0]  # the object's axes at the start, in its own
+        turned_to = np.einsum("ru,...uv,rv->...r", self.pairs[:, 0], back, self.pairs[:, 1])
+        mean = (here - there).mean(axis=-2)
         return Terms(
-            np.concatenate(inertial, axis=-1), (here - there).reshape(*many, self.N, -1), off, height
-        )  # fmt: skip
+            np.concatenate(inertial, axis=-1),
+            (here - there).reshape(*many, self.N, -1),
+            np.concatenate([mean, self.lever * turned_to], axis=-1),
+            off,
+            height,
+        )
 
     def places(self, poses: Poses, points: np.ndarray) -> np.ndarray:
         """(..., P, d) where points of the object are."""
@@ -213,10 +225,12 @@ def solved(eq: Equations, guess: Poses, w: np.ndarray, f: np.ndarray, applied: n
     at = eq.joined(w, f)
     value, by = eq.linearised(guess, at)
     x = cp.Variable(len(at))
-    rows = np.tile(1.0 / np.array(eq.units[eq.nq : 2 * eq.nq]), eq.N)  # of motion, in weights
-    must = [(rows[:, None] * by.motion) @ (x - at) == -rows * value.motion]
+    weigh = np.tile(1.0 / np.array(eq.units[eq.nq : 2 * eq.nq]), eq.N)
+    must = [(weigh[:, None] * by.motion) @ (x - at) == -weigh * value.motion]
     if horizon.stick:
-        A, b = row_space(by.sticking / eq.lever, -value.sticking / eq.lever)
+        # About poses that stick, every contact has its rows. About others all rows together contradict each other.
+        rows = (by.sticking, value.sticking) if np.abs(value.sticking).max() < 1e-9 else (by.reduced, value.reduced)
+        A, b = row_space(rows[0] / eq.lever, -rows[1] / eq.lever)
         must.append(A @ (x - at) == b)
     if len(eq.clear):
         must.append((by.height @ (x - at) + value.height) / eq.lever >= 0.0)

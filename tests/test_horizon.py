@@ -134,19 +134,22 @@ def test_plans_satisfy_their_own_equations(dim: int) -> None:
 
 @pytest.mark.parametrize("dim", CASES)
 def test_bounds_are_never_exceeded(dim: int) -> None:
-    """Nor rates, from step to step and from what is applied now; and somewhere each kind of bound is met."""
+    """Nor rates, from step to step and from what is applied now; and somewhere each kind of bound is met.
+
+    To 1e-8 of the bound where a plan is solved, to 1e-7 after the first of its passes.
+    """
     met: Counter[str] = Counter()
     pairs = zip(compared(dim), converged(dim), strict=True)
     for case, plan in [(one.case, plan) for one, last in pairs for plan in (one.plan, last)]:
         bounds, h = case.horizon.bounds, case.horizon.h
         if plan.status not in ("solved", "not converged"):
             continue
-        before = plan.wrench[:-1]
-        assert bounds.excess(plan.wrench) <= 1e-8
+        before, most = plan.wrench[:-1], 1e-8 if plan.status == "solved" else 1e-7
+        assert bounds.excess(plan.wrench) <= most
         if len(before):
-            assert bounds.excess(plan.wrench[1:], before, h) <= 1e-8
+            assert bounds.excess(plan.wrench[1:], before, h) <= most
         if case.applied is not None:
-            assert bounds.excess(plan.wrench[0], case.applied, h) <= 1e-8
+            assert bounds.excess(plan.wrench[0], case.applied, h) <= most
         at = np.linalg.norm(plan.wrench[:, :dim], axis=1), np.linalg.norm(plan.wrench[:, dim:], axis=1)
         met["force"] += bool(np.any(at[0] >= 0.98 * bounds.force))
         met["moment"] += bool(np.any(at[1] >= 0.98 * bounds.moment))

@@ -171,7 +171,7 @@ def test_slow_steps_balance_wherever_they_are(integrator: str) -> None:
     assert plan.status == "solved"
     assert np.abs(angles[1:] - TILT - [0.1, 0.2, 0.3]).max() > 0.01  # it gives way where that is cheaper
     for angle, wrench in zip(angles[1:], plan.wrench, strict=True):
-        np.testing.assert_allclose(wrench, solve(controller.problem(Motion(angle))).wrench, atol=1e-7)
+        np.testing.assert_allclose(wrench, solve(controller.problem(Motion(angle))).wrench, atol=2e-5)
 
 
 def test_semi_implicit_is_mujocos_free_body() -> None:
