@@ -1,6 +1,7 @@
 """Planning: the horizon's program solved, stated again about its own answer until that changes no more, and judged."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from time import perf_counter
 
 import numpy as np
@@ -21,10 +22,7 @@ class Plan:
     """An answer to a horizon's program, with how well it satisfies its own equations.
 
     Attributes:
-        horizon: what was planned.
-        position: (N+1, 3) CoM [m], world axes.  orientation: (N+1, 4) object axes to world.
-        velocity, angular_velocity: (N+1, 3) with which each pose is reached, world axes [m/s, rad/s].
-        wrench: (N, nw) object axes [N, N m].  force: (N, K, d) contact axes [N]; step t leads to pose t + 1.
+        horizon: what was planned.  guess: the answer, poses in table axes, as the next program can be stated about it.
         status: "solved", "not converged" (the last pass still changed more than asked), "infeasible" or "failed".
         said: by the solver.
         passes: how many programs were solved.
@@ -37,12 +35,7 @@ class Plan:
     """
 
     horizon: Horizon = field(repr=False)
-    position: Array
-    orientation: Array
-    velocity: Array
-    angular_velocity: Array
-    wrench: Array
-    force: Array
+    guess: Guess = field(repr=False)
     status: str
     said: str
     passes: int
@@ -53,7 +46,47 @@ class Plan:
     objective: float
     seconds: float
     solver_seconds: float
-    guess: Guess = field(repr=False)
+
+    @cached_property
+    def position(self) -> Array:
+        """(N+1, 3) CoM [m], world axes."""
+        return _frozen(self.guess.path.position @ self.horizon.table.T)
+
+    @cached_property
+    def orientation(self) -> Array:
+        """(N+1, 4) object axes to world."""
+        return _frozen(quaternion_product(self.horizon.controller.base, self.guess.path.orientation))
+
+    @cached_property
+    def velocity(self) -> Array:
+        """(N+1, 3) of the CoM, with which each pose is reached, world axes [m/s]."""
+        path = self.guess.path
+        moved = np.concatenate([path.arriving[None, :3], np.diff(path.position, axis=0)])
+        return _frozen(moved @ self.horizon.table.T / self.horizon.h)
+
+    @cached_property
+    def angular_velocity(self) -> Array:
+        """(N+1, 3) with which each pose is reached, world axes [rad/s]."""
+        path = self.guess.path
+        turned = np.empty((len(path.position), 3))
+        turned[0] = path.arriving[3:]
+        fill_differences(path.orientation, turned[1:])
+        return _frozen(rotated(self.orientation, turned / self.horizon.h))
+
+    @property
+    def wrench(self) -> Array:
+        """(N, nw) object axes [N, N m]; that of step t leads to pose t + 1."""
+        return self.guess.wrench
+
+    @property
+    def force(self) -> Array:
+        """(N, K, d) contact axes [N]."""
+        return self.guess.force.reshape(self.horizon.steps, -1, self.horizon.controller.space.dim)
+
+
+def _frozen(values: Array) -> Array:
+    values.flags.writeable = False
+    return values
 
 
 class PlanError(RuntimeError):
@@ -144,7 +177,10 @@ class Planner:
             if status == "solved":
                 break
         motion, stick = self.program.defects(now)
-        return self._finished(
+        for values in (now.wrench, now.force):
+            values.flags.writeable = False
+        return Plan(
+            self.horizon,
             now,
             status=status,
             said=said,
@@ -157,24 +193,3 @@ class Planner:
             seconds=perf_counter() - began,
             solver_seconds=inside,
         )
-
-    def _finished(self, guess: Guess, **said: object) -> Plan:
-        """The guess in world axes."""
-        horizon, path = self.horizon, guess.path
-        table, count = horizon.table, len(path.position)
-        rates = np.empty((count, 6))
-        rates[0], rates[1:, :3] = path.arriving, np.diff(path.position, axis=0)
-        fill_differences(path.orientation, rates[1:, 3:])
-        rates /= horizon.h
-        orientation = quaternion_product(horizon.controller.base, path.orientation)
-        values = {
-            "position": path.position @ table.T,
-            "orientation": orientation,
-            "velocity": rates[:, :3] @ table.T,
-            "angular_velocity": rotated(orientation, rates[:, 3:]),
-            "wrench": guess.wrench,
-            "force": guess.force.reshape(horizon.steps, -1, horizon.controller.space.dim),
-        }
-        for value in values.values():
-            value.flags.writeable = False
-        return Plan(horizon=horizon, guess=guess, **values, **said)  # type: ignore[arg-type]

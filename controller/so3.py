@@ -17,9 +17,14 @@ def exponential(vector: Array) -> Array:
 
 def rotated(orientation: Array, points: Array) -> Array:
     """(..., 3) points turned by unit quaternions (..., 4), shapes broadcast."""
-    w, axis = orientation[..., :1], orientation[..., 1:]
-    t = 2.0 * np.cross(axis, points)
-    return points + w * t + np.cross(axis, t)
+    w, a, b, c = (orientation[..., i] for i in range(4))
+    x, y, z = (points[..., i] for i in range(3))
+    t, u, v = 2.0 * (b * z - c * y), 2.0 * (c * x - a * z), 2.0 * (a * y - b * x)  # twice axis x point
+    out = np.empty((*np.broadcast_shapes(orientation.shape[:-1], points.shape[:-1]), 3))
+    out[..., 0] = x + w * t + b * v - c * u
+    out[..., 1] = y + w * u + c * t - a * v
+    out[..., 2] = z + w * v + a * u - b * t
+    return out
 
 
 @kernel
