@@ -12,7 +12,7 @@ demo: $(STAMP)
 	@echo "the solution space: out/solution-space.png; the recording: $(BIN)/rerun out/pivot-2d.rrd"
 
 test: $(STAMP)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 check: $(STAMP)
 	$(BIN)/ruff check .
