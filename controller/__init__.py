@@ -13,8 +13,9 @@ from pivoting.controller.contacts import Contact
 from pivoting.controller.controller import WrenchController
 from pivoting.controller.horizon import BodyState, Horizon
 from pivoting.controller.laws import Body, Law
-from pivoting.controller.plan import Plan, Planner
+from pivoting.controller.plan import Plan, PlanError, Planner
 from pivoting.controller.problem import WrenchProblem, wrench_weight
+from pivoting.controller.receding import RecedingHorizon
 from pivoting.controller.references import Constant, MinimumJerk, Reference, Sampled, Sine
 from pivoting.controller.solution import Solution, SolveError
 from pivoting.controller.solvers import methods, pyramid_excess, solve
@@ -31,7 +32,9 @@ __all__ = [
     "MinimumJerk",
     "Motion",
     "Plan",
+    "PlanError",
     "Planner",
+    "RecedingHorizon",
     "Reference",
     "Sampled",
     "Sine",

@@ -144,6 +144,8 @@ class QuadraticBackend:
         none = Answer(np.full(len(program.q), np.nan), np.full(len(b), np.nan), "", 0.0)
         try:
             found = qpsolvers.solve_problem(stated, solver=self._backend, **self._options)
+        except TypeError as error:  # an option that it does not have
+            raise fail("options", self._options, f"options of {self._backend} ({error})") from None
         except Exception as error:  # each backend has its own: what it says is kept, and there is no answer
             return none._replace(said=f"{type(error).__name__}: {error}", seconds=perf_counter() - start)
         seconds = perf_counter() - start

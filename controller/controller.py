@@ -50,7 +50,8 @@ class WrenchController:
         contacts: the contacts that are to stick, all planar or all spatial.
         law: static, quasi-dynamic (with the velocity or as in the notes) or dynamic.
         gravity: (d,) in world axes [m/s^2]; in the plane (x, z), or (3,) for a plane that is not x-z.
-        base: (4,) quaternion of the table in the world, for planar contacts; theta is measured from the table.
+        base: (4,) quaternion of the table in the world; in the plane theta is measured from it, in space a `Horizon`
+            takes the table's axes from it.
         margin: share of mu kept unused.
         Q_w, Q_f: weights in object axes; Q_w defaults to a characteristic length of |pivot|, and the radius if it
             rolls (see `wrench_weight`).

@@ -116,9 +116,16 @@ class Horizon:
         """(3, 3) the table's axes as columns, world axes."""
         return rotation_matrix(self.controller.base)
 
+    @property
+    def times(self) -> Array:
+        """(N,) after how long poses 1 to N are reached [s]; pose 0 is now, but for "forward" one step ahead."""
+        first = 2 if INTEGRATORS[self.integrator][1] == 2 else 1
+        return self.h * np.arange(first, first + self.steps, dtype=float)
+
     def start(self, state: BodyState) -> Path:
         """Pose 0 alone, in table axes, and how it is reached; see `Path`."""
         where, at = array("position", state.position, (3,)), unit_quaternions("orientation", state.orientation, (4,))
+        self._refuse_off_plane("orientation", at)
         velocity, omega = (array(name, getattr(state, name), (3,)) for name in ("velocity", "angular_velocity"))
         position = self.table.T @ where
         orientation = quaternion_product(self.controller.base * CONJUGATE, at)
@@ -131,6 +138,11 @@ class Horizon:
             orientation = quaternion_product(orientation, exponential(arriving[3:]))
         return Path(position[None], orientation[None], before, arriving)
 
+    def _refuse_off_plane(self, name: str, orientation: Array) -> None:
+        relative = quaternion_product(self.controller.base * CONJUGATE, orientation)
+        if self.controller.space.dim == 2 and np.abs(relative[..., [1, 3]]).max() > 1e-6:
+            raise fail(name, orientation, "in the controller's plane, which its base gives")
+
     def height(self, state: BodyState) -> float:
         """How far the lowest of the `clear` points is above the lowest contact, over the lever; inf without any."""
         points = np.concatenate([self.controller.belief.points, self.clear])
@@ -142,7 +154,7 @@ class Horizon:
         """Desired poses, in world axes, that turn about the contacts where they are now: (N, 3) CoMs, (N, 4).
 
         Args:
-            orientations: (N, 4) quaternions object to world.
+            orientations: (N, 4) quaternions object to world, at `times`.
         """
         q = unit_quaternions("orientations", orientations, (self.steps, 4))
         pivot = self.controller.belief.pivot
@@ -153,6 +165,7 @@ class Horizon:
         """Desired poses in table axes, from (N, 3) and (N, 4) in world axes."""
         c = array("positions", positions, (self.steps, 3))
         q = unit_quaternions("orientations", orientations, (self.steps, 4))
+        self._refuse_off_plane("orientations", q)
         return np.ascontiguousarray(c @ self.table), quaternion_product(self.controller.base * CONJUGATE, q)
 
 

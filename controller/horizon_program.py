@@ -204,9 +204,15 @@ class HorizonProgram:
         rows = self._rows(guess)
         wanted = np.ascontiguousarray(vectors[N + 1 : 2 * N + 1, :3]), turns[N + 1 : 2 * N + 1]
         curvature = self._tracking(path, wanted)[0]
-        masks = [np.abs(block).max(axis=0) > 1e-14 for block in (*rows.motion, rows.sticking, rows.clearance)]
-        return _Rows(masks[:5], masks[5], masks[6], rows.sides), np.abs(curvature).max(axis=0) > 1e-14
+        masks = [_pattern(block) for block in (*rows.motion, rows.sticking, rows.clearance, curvature)]
+        return _Rows(masks[:5], masks[5], masks[6], rows.sides), masks[7]
 
 
 def _repeated(block: Array, steps: int) -> Array:
     return np.broadcast_to(block, (steps, *block.shape))
+
+
+def _pattern(blocks: Array) -> Array:
+    """(r, c) which entries of (N, r, c) are more than rounding in any of them."""
+    size = np.abs(blocks).max(axis=0, initial=0.0)
+    return size > 1e-14 * size.max(initial=0.0)

@@ -1,5 +1,6 @@
 """Planning: the horizon's program solved, stated again about its own answer until that changes no more, and judged."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
@@ -10,6 +11,7 @@ from pivoting.controller.horizon import BodyState, Horizon
 from pivoting.controller.horizon_program import Guess, HorizonProgram
 from pivoting.controller.so3 import fill_differences, rotated
 from pivoting.controller.space import quaternion_product
+from pivoting.controller.transcription import Path
 from pivoting.controller.validate import Array, array, fail, number
 
 RESIDUAL = 1e-6  # relative KKT residual of a pass's program up to which its answer is taken
@@ -94,7 +96,7 @@ class PlanError(RuntimeError):
 
     def __init__(self, plan: Plan):
         self.plan = plan
-        last = f"its last change was {plan.changes[-1]:.2g}" if plan.changes else "nothing was solved"
+        last = f"its last change was {plan.changes[-1]:.2g}" if plan.changes else "no program had an answer"
         super().__init__(
             f"plan: {plan.status} after {plan.passes} passes, {last}, KKT residual {plan.residual:.3g}; "
             f"the solver said: {plan.said}"
@@ -121,16 +123,37 @@ class Planner:
             raise fail("method", method, '"clarabel": this program has second-order cones')
         self._solve: Solver = solver(self.method, **options)
 
-    def guess(self, state: BodyState, desired: tuple[Array, Array]) -> Guess:
-        """About the desired poses, with no forces: J_c of the reference."""
-        start = self.horizon.start(state)
+    def guess(self, state: BodyState, desired: tuple[Array, Array] | None = None) -> Guess:
+        """About desired poses (N, 3), (N, 4) in world axes, with no forces: J_c of the reference.
+
+        None: about where the object is, which is further from the answer, but always keeps contacts where they are.
+        """
+        start, N, belief = self.horizon.start(state), self.horizon.steps, self.horizon.controller.belief
+        if desired is None:
+            still = np.repeat(start.position, N, axis=0), np.repeat(start.orientation, N, axis=0)
+        else:
+            still = self.horizon.desired(*desired)
+        return self._from(start, still, np.zeros((N, len(belief.Q_w))), np.zeros((N, len(belief.Q_f))))
+
+    def _from(self, start: Path, poses: tuple[Array, Array], wrench: Array, force: Array) -> Guess:
+        """A guess of poses 1 to N, (N, 3) and (N, 4) in table axes, that begins where the object is."""
         path = start._replace(
-            position=np.concatenate([start.position, desired[0]]),
-            orientation=np.concatenate([start.orientation, desired[1]]),
+            position=np.concatenate([start.position, poses[0]]),
+            orientation=np.concatenate([start.orientation, poses[1]]),
         )
-        belief = self.horizon.controller.belief
-        N = self.horizon.steps
-        return Guess(path, np.zeros((N, len(belief.Q_w))), np.zeros((N, len(belief.Q_f))))
+        return Guess(path, np.array(wrench), np.array(force))
+
+    def _begun(self, guess: Guess, state: BodyState) -> Guess:
+        """A guess that was made for another state, from this one."""
+        N, belief = self.horizon.steps, self.horizon.controller.belief
+        if not isinstance(guess, Guess):
+            raise fail("guess", guess, "a Guess, as `Plan.guess` or `Planner.guess` is")
+        shapes = tuple(np.shape(part) for part in (*guess.path[:2], guess.wrench, guess.force))
+        wanted = ((N + 1, 3), (N + 1, 4), (N, len(belief.Q_w)), (N, len(belief.Q_f)))
+        if shapes != wanted:
+            raise fail("guess", f"one of shapes {shapes}", f"of shapes {wanted}")
+        poses = guess.path.position[1:], guess.path.orientation[1:]
+        return self._from(self.horizon.start(state), poses, guess.wrench, guess.force)
 
     def plan(
         self,
@@ -142,39 +165,50 @@ class Planner:
         passes: int = 50,
         tolerance: float = CONVERGED,
     ) -> Plan:
-        """Plan from `state` towards poses (N, 3), (N, 4) in world axes.
+        """Plan from `state` towards poses (N, 3), (N, 4) in world axes, at the times `Horizon.times`.
+
+        Look at the plan's status: one that is "infeasible" or "failed" is no plan, and holds what it was stated about.
 
         Args:
-            guess: about which the first program is stated; default the desired poses.
+            guess: about which the first program is stated; it begins at `state` whatever it began at before. None: the
+                desired poses, and if there is no answer about those, which may be far away, where the object is.
             applied: see `HorizonProgram.stated`.
             passes: at most so many programs; with 1 the answer is that of the program about the guess.
         """
         number("tolerance", tolerance, above=0.0)
-        if isinstance(passes, bool) or not isinstance(passes, int) or passes < 1:
+        if isinstance(passes, bool) or not isinstance(passes, int | np.integer) or passes < 1:
             raise fail("passes", passes, "a whole number >= 1")
-        if guess is not None and not isinstance(guess, Guess):
-            raise fail("guess", guess, "a Guess, as `Plan.guess` or `Planner.guess` is")
+        if not isinstance(state, BodyState):
+            raise fail("state", state, "a BodyState")
+        if not isinstance(desired, tuple | list) or len(desired) != 2:
+            raise fail("desired", desired, "positions (N, 3) and orientations (N, 4), as of `Horizon.arc`")
         if applied is not None:
             applied = array("applied", applied, (len(self.horizon.controller.Q_w),))
         began = perf_counter()
         wanted = self.horizon.desired(*desired)
-        now = self.guess(state, wanted) if guess is None else guess
-        changes: list[float] = []
-        inside, residual, status, said = 0.0, float("nan"), "failed", ""
-        for _ in range(passes):
-            program = self.program.stated(wanted, now, applied)
-            answer = self._solve(program)
-            inside += answer.seconds
-            residual, said = kkt_residual(program, answer), answer.said
-            if not residual <= RESIDUAL:
-                if "infeasible" not in said.lower() and self.method != "clarabel":  # few backends prove it
-                    said = f"{said}; clarabel: {ClarabelInPlace()(program).said}"
-                status = "infeasible" if "infeasible" in said.lower() else "failed"
-                break
-            now, change = self.program.corrected(now, answer.x)
-            changes.append(change)
-            status = "solved" if change <= tolerance else "not converged"
-            if status == "solved":
+        guesses: list[Callable[[], Guess]] = [lambda: self.guess(state, desired), lambda: self.guess(state)]
+        if guess is not None:
+            given = guess
+            guesses = [lambda: self._begun(given, state)]
+        inside, tried = 0.0, 0
+        for make in guesses:
+            now, changes = make(), []
+            for _ in range(passes):
+                program = self.program.stated(wanted, now, applied)
+                answer = self._solve(program)
+                inside, tried = inside + answer.seconds, tried + 1
+                residual, said = kkt_residual(program, answer), answer.said
+                if not residual <= RESIDUAL:
+                    if "infeasible" not in said.lower() and self.method != "clarabel":  # few backends prove it
+                        said = f"{said}; clarabel: {ClarabelInPlace()(program).said}"
+                    status = "infeasible" if "infeasible" in said.lower() else "failed"
+                    break
+                now, change = self.program.corrected(now, answer.x)
+                changes.append(change)
+                status = "solved" if change <= tolerance else "not converged"
+                if status == "solved":
+                    break
+            if changes:
                 break
         motion, stick = self.program.defects(now)
         for values in (now.wrench, now.force):
@@ -184,7 +218,7 @@ class Planner:
             now,
             status=status,
             said=said,
-            passes=len(changes),
+            passes=tried,
             changes=tuple(changes),
             residual=residual,
             motion_defect=motion,

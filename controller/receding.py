@@ -13,6 +13,7 @@ from pivoting.controller.transcription import INTEGRATORS
 from pivoting.controller.validate import Array, fail
 
 OUTCOMES = ("planned", "shifted", "holding", "released")  # what is followed, see `RecedingHorizon`
+FOUND = ("solved", "not converged")
 LANDED = 1e-3  # of the lever: a watched point this close to the table has come down on it
 
 
@@ -42,7 +43,8 @@ class RecedingHorizon:
 
     Attributes:
         planner: of the horizon.  period: [s].
-        passes: programs solved for each plan; the next plan goes on from there.
+        passes: programs solved for each plan. They are stated about the desired poses, with the last plan's wrenches
+            and forces, shifted by whole steps; three times as many where there is no such plan.
     """
 
     planner: Planner
@@ -66,13 +68,14 @@ class RecedingHorizon:
             return last
         horizon = self.planner.horizon
         desired = horizon.arc(orientations, state)
-        guess, passes = None, 3 * self.passes
+        attempt = None
         if last is not None and last.plan is not None and last.outcome == "planned":
             shifted = _shifted(last.plan, (last.since + self.period) / horizon.h)
-            guess = shifted._replace(path=self.planner.guess(state, horizon.desired(*desired)).path)
-            passes = self.passes
-        attempt = self.planner.plan(state, desired, guess=guess, applied=applied, passes=passes)
-        if attempt.status in ("solved", "not converged"):
+            guess = shifted._replace(path=self.planner.guess(state, desired).path)
+            attempt = self.planner.plan(state, desired, guess=guess, applied=applied, passes=self.passes)
+        if attempt is None or attempt.status not in FOUND:
+            attempt = self.planner.plan(state, desired, applied=applied, passes=3 * self.passes)
+        if attempt.status in FOUND:
             return Followed(attempt, 0.0, "planned", attempt)
         since = horizon.steps * horizon.h if last is None or last.plan is None else last.since + self.period
         if last is None or since + self.period > horizon.steps * horizon.h + 1e-9:

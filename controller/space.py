@@ -36,7 +36,7 @@ class Space:
     Attributes:
         dim: 2 (plane) or 3 (space).
         base: (4,) quaternion of the table's frame (tangent, -, normal) in the world; theta = 0 means that the
-            object's axes are the table's. Identity on a level table. In space it is unused.
+            object's axes are the table's. Identity on a level table. In space only a `Horizon` uses it.
     """
 
     dim: int

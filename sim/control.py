@@ -7,12 +7,11 @@ from numpy.typing import NDArray
 from pivoting.controller.bounded import BoundedSolver
 from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.controller import WrenchController, step_worlds
-from pivoting.controller.horizon import BodyState, Horizon
+from pivoting.controller.horizon import BodyState
 from pivoting.controller.plan import Plan, PlanError, Planner
 from pivoting.controller.receding import OUTCOMES, Followed, RecedingHorizon, followed_motion
 from pivoting.controller.rotations import Turn
 from pivoting.controller.solution import STATUS
-from pivoting.controller.transcription import INTEGRATORS
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-9  # relative KKT residual of an answer that counts as solved
@@ -84,7 +83,7 @@ class BoundedControl:
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
         self._inner(k, states, before, out)
         for i in range(len(out.wrench)):
-            last = None if before is None or not np.isfinite(before[i]).all() else before[i]
+            last = None if before is None else np.nan_to_num(before[i])  # no answer: none was applied
             if not self._bounds.excess(out.wrench[i], last, self._dt) > OVER:
                 continue
             jacobian = self._controller.jacobian(states.orientation[i])
@@ -145,12 +144,6 @@ class Event(NamedTuple):
     what: str
 
 
-def plan_times(horizon: Horizon) -> Array:
-    """(N,) after how long a horizon's poses are reached [s]."""
-    first = 2 if INTEGRATORS[horizon.integrator][1] == 2 else 1
-    return horizon.h * np.arange(first, first + horizon.steps, dtype=float)
-
-
 class HorizonControl:
     """A receding horizon for each world; the per-step law follows its plans.
 
@@ -206,14 +199,14 @@ class HorizonControl:
 
     def _wanted(self, k: int) -> Array:
         """(N, 4) desired orientations over the horizon that begins at step k."""
-        times = k * self._dt + plan_times(self._horizons[0].planner.horizon)
+        times = k * self._dt + self._horizons[0].planner.horizon.times
         return np.asarray(self._reference(times).orientation)
 
     def _plan(self, i: int, k: int, states: States, before: Array | None) -> None:
         state = BodyState(*(np.array(values[i]) for values in states))
         if not all(np.isfinite(values).all() for values in state):
             return  # the world has diverged: its law will say so
-        applied = None if before is None or not np.isfinite(before[i]).all() else before[i]
+        applied = None if before is None else np.nan_to_num(before[i])
         last = self._followed[i]
         now = self._horizons[i].replan(state, self._wanted(k), last, applied)
         self._followed[i] = now
@@ -258,7 +251,7 @@ class PlayControl:
         """
         horizon = self._planner.horizon
         state = BodyState(*(np.array(values[0]) for values in states))
-        wanted = np.asarray(self._reference(plan_times(horizon)).orientation)
+        wanted = np.asarray(self._reference(horizon.times).orientation)
         plan = self._planner.plan(state, horizon.arc(wanted, state))
         if plan.status != "solved":
             raise PlanError(plan)

@@ -30,8 +30,10 @@ def horizon_control(
     """
     assert case.plan_hz is not None
     every = round(1.0 / (case.plan_hz * dt))
-    if every < 1 or every * dt > case.plan_steps * case.plan_step:
-        allowed = f"such that a plan is made every {dt:g} s (the time step) to {case.plan_steps * case.plan_step:g} s"
+    whole = abs(every * dt * case.plan_hz - 1.0) < 1e-6
+    if not whole or every < 1 or every * dt > case.plan_steps * case.plan_step:
+        longest = f"{case.plan_steps * case.plan_step:g} s"
+        allowed = f"such that a plan is made every {dt:g} s (the time step) to {longest}, in whole time steps"
         raise fail("plan_hz", case.plan_hz, allowed)
     horizon = scenario_horizon(case, attached, plan)
     horizons = [RecedingHorizon(Planner(horizon), every * dt) for _ in range(worlds)]
@@ -43,6 +45,9 @@ def play_control(case: Scenario, attached: Attached, plan: Plan, reference: Turn
     per = round(case.plan_step / dt)
     if per < 1 or abs(per * dt - case.plan_step) > 1e-9:
         raise fail("plan_step", case.plan_step, f"a whole number of time steps of {dt:g} s, in open loop")
+    if per > 1 and (case.force_rate is not None or case.moment_rate is not None):
+        allowed = f"the time step, {dt:g} s, with a bound on a rate: between two steps of a plan its wrench jumps"
+        raise fail("plan_step", case.plan_step, allowed)
     horizon = scenario_horizon(case, attached, plan, steps=-(-steps // per))
     return PlayControl(Planner(horizon), reference, per)
 

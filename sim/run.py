@@ -11,7 +11,7 @@ from pivoting.controller.plan import Plan
 from pivoting.controller.space import Space, quaternion_product, space
 from pivoting.models.reading import RigidBody, matrix
 from pivoting.sim.attach import Attached
-from pivoting.sim.control import BOUNDED, Event, PlanLog, plan_figures, plan_times
+from pivoting.sim.control import BOUNDED, Event, PlanLog, plan_figures
 from pivoting.sim.fidelity import ContactRows
 from pivoting.sim.monitor import Measures, measure
 from pivoting.sim.scenario import Scenario
@@ -258,7 +258,8 @@ class Run:
         """
         if self.plan is None:
             raise ValueError("run: was in closed loop; must be of simulate(..., open_loop=True)")
-        times = np.concatenate([[0.0], plan_times(self.plan.horizon)])
+        first = self.plan.horizon.times[0] - self.plan.horizon.h  # of pose 0
+        times = np.concatenate([[first], self.plan.horizon.times])
         kept = times <= self.time[-1] + 1e-9
         steps = np.round(times[kept] / self.dt).astype(int)
         turned = quaternion_product(self.quaternion[:, steps], self.plan.orientation[kept] * INVERSE)
