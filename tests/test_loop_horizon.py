@@ -136,6 +136,18 @@ def test_keys_that_make_no_sense_are_refused(keys: dict, message: str) -> None:
         simulate("mpc-2d", **keys)
     with pytest.raises(ValueError, match=r"plan_step = 0\.0015: must be a whole number of time steps"):
         simulate("mpc-2d", open_loop=True, plan_step=0.0015)
+    with pytest.raises(ValueError, match=r"plan_step = 0\.02: must be the time step, 0\.001 s, with a bound on a rate"):
+        simulate("mpc-2d", open_loop=True, force_rate=20.0)
+    with pytest.raises(ValueError, match=r"plan_hz = 600\.0: must be .* in whole time steps"):
+        simulate("mpc-2d", plan_hz=600.0)
+
+
+def test_a_start_far_off_the_reference_is_planned_for() -> None:
+    """Up to 10 deg, within the bound on the force: every plan is found."""
+    run = simulate("mpc-2d", worlds=2, seed=1, spread=10.0, seconds=0.3, theta_end=30.0)
+    assert run.plans is not None
+    assert not run.plans.outcome.any()
+    assert run.events == ()
 
 
 def test_the_command_line_says_what_happened() -> None:

@@ -84,6 +84,36 @@ def test_without_a_plan_the_object_is_to_stay_and_is_let_go_once_it_is_down() ->
     assert horizon.replan(at(0.5), towards(0.5, 0.6), down) is down
 
 
+@pytest.mark.parametrize("target", [18.0, 30.0, 80.0])
+def test_a_desired_pose_that_is_far_away_is_not_infeasible(target: float) -> None:
+    """About it no corrections are admissible; about where the block is, they are."""
+    planner = receding(WrenchBounds(force=8.0, moment=3.0)).planner
+    state, goal = at(np.deg2rad(10.0)), space(2).orientation(np.full(20, np.deg2rad(target)))
+    plan = planner.plan(state, planner.horizon.arc(goal, state))
+    assert plan.status == "solved"
+    assert planner.horizon.bounds.excess(plan.wrench) < 1e-8
+    assert space(2).angle(plan.orientation[-1]) > np.deg2rad(11.0)
+
+
+def test_a_guess_begins_where_the_object_is() -> None:
+    """Whatever state it was made for."""
+    planner = receding().planner
+    old, state = at(0.5), at(0.52, 0.4)
+    first = planner.plan(old, planner.horizon.arc(towards(0.5, 0.6), old))
+    plan = planner.plan(state, planner.horizon.arc(towards(0.52, 0.6), state), guess=first.guess)
+    assert plan.status == "solved"
+    np.testing.assert_allclose(plan.orientation[0], state.orientation, atol=1e-15)
+    np.testing.assert_allclose(plan.angular_velocity[0], state.angular_velocity, atol=1e-12)
+
+
+def test_what_is_off_the_plane_is_refused() -> None:
+    planner = receding().planner
+    state = at(0.5)
+    off = state._replace(orientation=np.array([np.cos(0.2), np.sin(0.2), 0.0, 0.0]))
+    with pytest.raises(ValueError, match=r"orientation = .*: must be in the controller's plane"):
+        planner.plan(off, planner.horizon.arc(towards(0.5, 0.6), state))
+
+
 def test_plans_go_on_from_the_last_one() -> None:
     """One pass for each is enough: of the bilinear terms less than a hundredth of the weight is left out."""
     horizon = receding()
