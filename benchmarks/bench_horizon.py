@@ -265,7 +265,7 @@ if __name__ == "__main__":
     main(
         __doc__ or "",
         measure,
-        {f"{name}: {OURS}, ms": 1.0 if dim == 2 else 5.0 for name, dim in ASKED.items()},
+        {f"{name}: its solver, ms": 1.0 if dim == 2 else 5.0 for name, dim in ASKED.items()},
         floors={f"{name}: cvxpy / ours": 3.0 for name in ASKED},
         markdown=markdown,
     )

@@ -25,6 +25,7 @@ _TIGHT = {
 _CLARABEL = {
     **CLARABEL,
     **_TIGHT,
+    "max_step_fraction": 0.99,  # 8 iterations in place of 11; every answer is certified
     # what an update in place needs: the pattern that it was set up with
     "max_threads": 1,
     "presolve_enable": False,
