@@ -111,13 +111,13 @@ def followed_motion(followed: Followed, state: BodyState, times: Array) -> tuple
     else:
         steps = np.diff(rates, axis=0) / h
     begun = plan.guess.path.before[3:]
-    nodes = np.empty((N + 1, 4))
-    nodes[0] = quaternion_product(plan.horizon.controller.base, begun)
-    turns = rates[:-1] * h + 0.5 * steps * h**2  # world axes, each about an axis that hardly turns within a step
-    for t in range(N):
-        nodes[t + 1] = quaternion_product(exponential(turns[t]), nodes[t])
     at = np.clip(followed.since + times, 0.0, N * h)
     index = np.minimum((at / h + 1e-9).astype(int), N - 1)
+    nodes = np.empty((index[-1] + 1, 4))
+    nodes[0] = quaternion_product(plan.horizon.controller.base, begun)
+    turns = rates[:-1] * h + 0.5 * steps * h**2  # world axes, each about an axis that hardly turns within a step
+    for t in range(index[-1]):
+        nodes[t + 1] = quaternion_product(exponential(turns[t]), nodes[t])
     tau = (at - index * h)[:, None]
     turned = quaternion_product(exponential(rates[index] * tau + 0.5 * steps[index] * tau**2), nodes[index])
     return turned, rates[index] + steps[index] * tau, steps[index]
