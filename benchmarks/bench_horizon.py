@@ -174,7 +174,7 @@ def family(name: str, count: int) -> dict[str, float]:
     dim = FAMILIES[name][0]
     mine = planner(*FAMILIES[name])
     horizon, rng = mine.horizon, np.random.default_rng(2026)
-    units = horizon.unit * np.array([1.0] * dim + [horizon.length] * (3 * dim - 3 - dim))
+    units = horizon.controller.units
     spent: dict[str, list[float]] = {OURS: [], "its solver": [], "whole plan": []}
     passes, defects, changes, tied, errors, routes = [], [], [], [], {}, {}
     for i in track(range(-1, count), name, transient=True):
@@ -213,8 +213,8 @@ def family(name: str, count: int) -> dict[str, float]:
                 continue
             other, _ = mine.program.corrected(guess, np.asarray(x))
             off = (
-                np.abs((other.wrench - plan.wrench) / units).max(),
-                np.abs(other.force.ravel() - plan.force.ravel()).max() / horizon.unit,
+                np.abs((other.wrench - plan.wrench) / units.wrench).max(),
+                np.abs(other.force.ravel() - plan.force.ravel()).max() / units.force,
             )
             errors[peer].append(max(off))
     out = {f"{name}: {what}, ms": float(np.median(ms)) for what, ms in spent.items() if what not in routes}

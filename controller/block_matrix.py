@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.controller.kernel import kernel
 from pivoting.controller.validate import Array
 from scipy import sparse
 
@@ -11,11 +12,15 @@ Indices = NDArray[np.int64]
 
 
 class Part(NamedTuple):
-    """S equal blocks: rows (S, r) and columns (S, c) of each, and the mask (r, c) of what may be other than zero."""
+    """S equal blocks: rows (S, r) and columns (S, c) of each, and the mask (r, c) of what may be other than zero.
+
+    still: (r, c) the same numbers in all blocks and for good; None: they change.
+    """
 
     rows: Indices
     columns: Indices
     mask: NDArray[np.bool_]
+    still: Array | None = None
 
 
 class Sparse(NamedTuple):
@@ -32,11 +37,10 @@ class Sparse(NamedTuple):
 
 
 class BlockMatrix:
-    """The pattern of a sparse matrix made of parts that do not overlap."""
+    """The pattern of a sparse matrix made of parts that do not overlap, and the numbers that do not change."""
 
     def __init__(self, shape: tuple[int, int], parts: list[Part]):
         self.shape = shape
-        self._masks = [part.mask for part in parts]
         rows, columns, counts = [], [], []
         for part in parts:
             i, j = np.nonzero(part.mask)
@@ -49,13 +53,27 @@ class BlockMatrix:
         self._indptr = np.concatenate([[0], np.cumsum(np.bincount(column, minlength=shape[1]))]).astype(np.int32)
         slots = np.empty(len(order), dtype=np.int64)
         slots[order] = np.arange(len(order))
-        self._slots = np.split(slots, np.cumsum(counts)[:-1])
-        self._entries = [np.flatnonzero(mask) for mask in self._masks]
+        self._data = np.zeros(len(order))
+        self._changing: list[tuple[Indices, Indices]] = []  # slots (S, entries of a block), and these entries
+        for part, where in zip(parts, np.split(slots, np.cumsum(counts)[:-1]), strict=True):
+            entries = np.flatnonzero(part.mask)
+            where = where.reshape(len(part.rows), len(entries))
+            if part.still is None:
+                self._changing.append((where, entries))
+            else:
+                self._data[where] = part.still.ravel()[entries]
 
     def filled(self, values: list[Array]) -> Sparse:
-        """The matrix, from one array (S, r, c) for each part."""
-        data = np.empty(len(self._indices))
-        for slots, entries, mask, block in zip(self._slots, self._entries, self._masks, values, strict=True):
-            if len(entries):  # no blocks at all, where N = 1 and they belong to the step before, are (0, r c)
-                data[slots] = block.reshape(-1, mask.size)[:, entries].ravel()
+        """The matrix, from one array (S, r, c) for each part that changes."""
+        data = self._data.copy()
+        for (slots, entries), blocks in zip(self._changing, values, strict=True):
+            if slots.size:  # no blocks at all, where N = 1 and they belong to the step before, are (0, r, c)
+                _scatter(slots, entries, blocks.reshape(len(slots), -1), data)
         return Sparse(data, self._indices, self._indptr, self.shape)
+
+
+@kernel
+def _scatter(slots, entries, blocks, data):  # type: ignore[no-untyped-def]
+    for s in range(slots.shape[0]):
+        for e in range(slots.shape[1]):
+            data[slots[s, e]] = blocks[s, entries[e]]

@@ -9,7 +9,7 @@ that both are zero where the bounds allow it, and s is where giving up a is enou
 from dataclasses import dataclass
 
 import numpy as np
-from pivoting.controller.block_matrix import BlockMatrix, Part
+from pivoting.controller.block_matrix import BlockMatrix, Indices, Part
 from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.conic_program import ClarabelInPlace, Cones, ConicProgram, kkt_residual
 from pivoting.controller.contact_set import free_axes
@@ -55,40 +55,45 @@ class BoundedSolver:
         number("dt", dt, above=0.0, unit="s")
         belief, dim = controller.belief, controller.space.dim
         self._controller, self._belief = controller, belief
-        self._unit = belief.mass * (float(np.linalg.norm(belief.gravity)) or 1.0)
-        length = float(np.linalg.norm(belief.pivot)) or 1.0
+        self._unit, self._scale = controller.units.force, controller.units.wrench
         nw, n = len(belief.Q_w), len(belief.Q_f)
-        self._scale = self._unit * np.array([1.0] * dim + [length] * (nw - dim))
-        self._friction = friction_limits(belief.mu, belief.f_min / self._unit, dim)
-        self._bounds = wrench_limits(bounds, nw, 0, self._scale, dt)
         self._axes = free_axes(belief.points, belief.pivot, belief.wrench_map)
         A = len(self._axes)
-        self._shape = nw, n, A
+        own = friction_limits(belief.mu, belief.f_min / self._unit, dim)
+        bound = self._bounds = wrench_limits(bounds, nw, 0, self._scale, dt)
         wide = n + nw + A + nw + 2
-        f, w, a, s = np.split(np.arange(wide - 2), np.cumsum([n, nw, A]))
-        t_a, t_s = wide - 2, wide - 1
-        own, bound = self._friction, self._bounds
-        linear, cone = np.zeros((len(own.linear) + len(bound.linear), wide)), []
-        linear[: len(own.linear), f], linear[len(own.linear) :, w] = own.linear, bound.linear
-        for rows, columns in ((own.cone, f), (bound.cone, w)):
-            block = np.zeros((len(rows), wide))
-            block[:, columns] = rows
-            cone.append(block)
-        for top, columns in ((t_a, a), (t_s, s)):
-            block = np.zeros((1 + len(columns), wide))
-            block[0, top] = -1.0
-            block[1:, columns] = -np.eye(len(columns))
-            cone.append(block)
-        balance = np.zeros((nw, wide))
-        balance[:, f], balance[:, w], balance[:, a], balance[:, s] = 1.0, np.eye(nw), 1.0, -np.eye(nw)
-        self._rows = np.vstack([balance, linear, *cone])
-        self._given = a
-        self._cones = Cones(nw, len(linear), own.orders + bound.orders + (1 + A, 1 + nw))
+        f, w, a, s, t_a, t_s = np.split(np.arange(wide), np.cumsum([n, nw, A, nw, 1]))
+        self._cones = Cones(nw, len(own.linear) + len(bound.linear), own.orders + bound.orders + (1 + A, 1 + nw))
+        self._sides = own.linear_side, own.cone_side, np.zeros(2 + A + nw)
+        tops = np.cumsum([0, nw, len(own.linear), len(bound.linear), len(own.cone), len(bound.cone), 1, A, 1, nw])
+
+        def part(first: int, columns: Indices, block: Array, changes: bool = False) -> Part:
+            rows = tops[first] + np.arange(len(block))
+            return Part(rows[None], columns[None], block != 0.0, None if changes else block)
+
+        minus = -np.ones((1, 1))
+        self._A = BlockMatrix(
+            (int(tops[-1]), wide),
+            [
+                part(0, f, np.ones((nw, n)), changes=True),
+                part(0, a, np.ones((nw, A)), changes=True),
+                part(0, w, np.eye(nw)),
+                part(0, s, -np.eye(nw)),
+                part(1, f, own.linear),
+                part(2, w, bound.linear),
+                part(3, f, own.cone),
+                part(4, w, bound.cone),
+                part(5, t_a, minus),
+                part(6, a, -np.eye(A)),
+                part(7, t_s, minus),
+                part(8, s, -np.eye(nw)),
+            ],
+        )
         P = np.zeros((wide, wide))
         P[np.ix_(f, f)] = belief.Q_f
         P[np.ix_(w, w)] = self._scale[:, None] * belief.Q_w * self._scale / self._unit**2
-        self._P = _pattern(np.triu(P)).filled([np.triu(P)[None]])
-        self._A = _pattern(self._rows)
+        P, every = np.triu(P), np.arange(wide)[None]
+        self._P = BlockMatrix((wide, wide), [Part(every, every, P != 0.0, P)]).filled([])
         self._q = np.zeros(wide)
         self._q[t_a], self._q[t_s] = GIVE_UP, BREAK
         self._solve = ClarabelInPlace()
@@ -101,23 +106,14 @@ class BoundedSolver:
             required: (nw,) see `WrenchProblem`.
             before: (nw,) wrench applied until now, for bounds on the rate; None: not known.
         """
-        nw, n, _ = self._shape
+        nw, n = len(self._scale), len(self._belief.Q_f)
         jacobian = self._controller.jacobian(orientation)
-        rows = self._rows.copy()
-        rows[:nw, :n] = jacobian * self._unit / self._scale[:, None]
-        rows[:nw, self._given] = -self._turning(orientation)
+        changing = [(jacobian * self._unit / self._scale[:, None])[None], -self._turning(orientation)[None]]
         last = None if before is None else np.asarray(before, dtype=float) / self._scale
-        sides = self._bounds.sides(1, last)
-        rest = np.zeros(sum(self._cones.orders[-2:]))
-        b = [
-            required / self._scale,
-            self._friction.linear_side,
-            sides[0][0],
-            self._friction.cone_side,
-            sides[1][0],
-            rest,
-        ]
-        program = ConicProgram(self._P, self._q, self._A.filled([rows[None]]), np.concatenate(b), self._cones)
+        linear, cone = self._bounds.first(last)
+        own_linear, own_cone, rest = self._sides
+        b = np.concatenate([required / self._scale, own_linear, linear, own_cone, cone, rest])
+        program = ConicProgram(self._P, self._q, self._A.filled(changing), b, self._cones)
         answer = self._solve(program)
         residual = kkt_residual(program, answer)
         if not residual <= POOR:  # scaled for another problem: begin anew, and keep the better of the two
@@ -140,9 +136,3 @@ class BoundedSolver:
         push = np.hstack([belief.mass * self._axes @ hat, self._axes @ belief.inertia])  # a x (-lever) = a hat(-lever)
         B = belief.wrench_map @ push.T / self._scale[:, None]
         return B / max(1e-300, float(np.abs(B).max(initial=0.0)))
-
-
-def _pattern(matrix: Array) -> BlockMatrix:
-    """Of a matrix (r, c), all of whose entries that may be other than zero are so."""
-    r, c = matrix.shape
-    return BlockMatrix((r, c), [Part(np.arange(r)[None], np.arange(c)[None], matrix != 0.0)])

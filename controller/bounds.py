@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from pivoting.controller.kernel import kernel
 from pivoting.controller.validate import Array, fail
 
 
@@ -14,6 +15,15 @@ class Ball(NamedTuple):
     rows: Array
     radius: float
     rate: bool
+
+
+class Stacked(NamedTuple):
+    """b balls: rows (r, nw) of all, where each one's begin and the last one's end (b + 1,), radius (b,), rate (b,)."""
+
+    rows: Array
+    first: NDArray[np.int64]
+    radius: Array
+    rate: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,19 +84,49 @@ class WrenchBounds:
         out += [Ball(force, self.force_rate, True), Ball(moment, self.moment_rate, True)]
         return tuple(ball for ball in out if np.isfinite(ball.radius))
 
+    def stacked(self, nw: int) -> Stacked:
+        """The same as arrays, for `fill_excess`."""
+        balls = self.balls(nw)
+        heights = [len(ball.rows) for ball in balls]
+        return Stacked(
+            np.concatenate([np.zeros((0, nw)), *(ball.rows for ball in balls)]),
+            np.cumsum([0, *heights]),
+            np.array([ball.radius for ball in balls]),
+            np.array([ball.rate for ball in balls], dtype=bool),
+        )
+
     def excess(self, wrench: Array, before: Array | None = None, dt: float = 1.0) -> float:
         """By how much a wrench (nw,), or any of many (..., nw), exceeds a bound, relative to that bound; <= 0: none.
 
         `before`: likewise, the wrench applied `dt` [s] earlier; None leaves the rates out. A wrench that is not a
         number gives nan: it is within no bound.
         """
+        nw = wrench.shape[-1]
+        last = np.broadcast_to(wrench if before is None else before, wrench.shape)
+        out = np.empty(wrench.size // nw)
+        fill_excess(self.stacked(nw), wrench.reshape(-1, nw), last.reshape(-1, nw), dt, out)
+        return float(out.max())
+
+
+@kernel
+def fill_excess(stacked, wrench, before, dt, out):  # type: ignore[no-untyped-def]
+    """Write by how much each of wrenches (W, nw) exceeds a bound, relative to it, into out (W,); -1 without any bound.
+
+    Args:
+        stacked: of `WrenchBounds.stacked`.
+        before: (W, nw) applied `dt` [s] earlier; the wrenches themselves leave rates out.
+    """
+    for i in range(wrench.shape[0]):
         worst = -1.0
-        for ball in self.balls(wrench.shape[-1]):
-            if not ball.rate:
-                change = wrench
-            elif before is not None:
-                change = (wrench - before) / dt
-            else:
-                continue
-            worst = np.maximum(worst, np.max(np.linalg.norm(change @ ball.rows.T, axis=-1)) / ball.radius - 1.0)
-        return float(worst)
+        for k in range(stacked.radius.shape[0]):
+            square = 0.0
+            for row in range(stacked.first[k], stacked.first[k + 1]):
+                value = 0.0
+                for j in range(wrench.shape[1]):
+                    change = (wrench[i, j] - before[i, j]) / dt if stacked.rate[k] else wrench[i, j]
+                    value += stacked.rows[row, j] * change
+                square += value * value
+            over = np.sqrt(square) / stacked.radius[k] - 1.0
+            if over > worst or np.isnan(over):
+                worst = over
+        out[i] = worst

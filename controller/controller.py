@@ -16,6 +16,7 @@ from pivoting.controller.kernel import inlined, kernel
 from pivoting.controller.laws import Body, Law, fill_required
 from pivoting.controller.problem import WrenchProblem, wrench_weight
 from pivoting.controller.space import IDENTITY, Motion, Space, fill_rotation, rotation_matrix, space
+from pivoting.controller.units import Units, units
 from pivoting.controller.validate import Array, array, fail, number, positive_definite
 
 SOLVED, INACCURATE, FAILED = 0, 1, 2  # codes of `solution.STATUS`
@@ -130,6 +131,12 @@ class WrenchController:
             wrench_map=here.wrench_map,
             force_map=np.ascontiguousarray(here.force_map),
         )
+
+    @cached_property
+    def units(self) -> Units:
+        """In which its programs are stated."""
+        belief = self.belief
+        return units(belief.mass, belief.gravity, belief.points, self.space.dim)
 
     def workspace(self) -> tuple[Array, Array | None]:
         """Scratch of the compiled loop, one for each thread."""

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike
 from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.controller import WrenchController
 from pivoting.controller.polygon import polygon
-from pivoting.controller.so3 import CONJUGATE, exponential, rotated
-from pivoting.controller.space import quaternion_product, rotation_matrix
+from pivoting.controller.so3 import exponential, rotated
+from pivoting.controller.space import CONJUGATE, quaternion_product, rotation_matrix
 from pivoting.controller.transcription import INTEGRATORS, Path
 from pivoting.controller.validate import Array, array, fail, number, one_of, positive_definite, unit_quaternions
 
@@ -99,18 +99,6 @@ class Horizon:
         put(self, "edges", 0 if disc or controller.space.dim == 3 else len(polygon(edges).facets))
         self.bounds.balls(nw)  # says what is wrong with them
 
-    @property
-    def unit(self) -> float:
-        """[N] of forces inside the program: the weight, or what accelerates the object by 1 m/s^2 without gravity."""
-        belief = self.controller.belief
-        return belief.mass * (float(np.linalg.norm(belief.gravity)) or 1.0)
-
-    @property
-    def length(self) -> float:
-        """[m] of translations inside the program: the lever from the CoM to the contacts, or to the farthest one."""
-        belief = self.controller.belief
-        return float(np.linalg.norm(belief.pivot)) or float(np.linalg.norm(belief.points, axis=1).max()) or 1.0
-
     @cached_property
     def table(self) -> Array:
         """(3, 3) the table's axes as columns, world axes."""
@@ -148,7 +136,7 @@ class Horizon:
         points = np.concatenate([self.controller.belief.points, self.clear])
         heights = rotated(np.asarray(state.orientation), points) @ self.table[:, 2]
         lowest = float(heights[: len(self.controller.contacts)].min())
-        return float((heights[len(self.controller.contacts) :] - lowest).min(initial=np.inf)) / self.length
+        return float((heights[len(self.controller.contacts) :] - lowest).min(initial=np.inf)) / self.controller.units.length
 
     def arc(self, orientations: ArrayLike, state: BodyState) -> tuple[Array, Array]:
         """Desired poses, in world axes, that turn about the contacts where they are now: (N, 3) CoMs, (N, 4).

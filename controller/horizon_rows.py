@@ -7,18 +7,17 @@ from pivoting.controller.space import cross, fill_rotation, into, rotation_error
 
 
 @kernel
-def fill_sticking(body, fixed, planar, length, path, rows, side):  # type: ignore[no-untyped-def]
+def fill_sticking(body, fixed, planar, path, rows, side):  # type: ignore[no-untyped-def]
     """Write rows (N, S, nq) and sides (N, S): rows d_t = side keeps the contacts where they were at the start.
 
     Args:
         body: `Mechanics`.
         fixed: (D, 2, 3) pairs (u, e) of object axes: e, where it pointed at the start, does not turn towards u.
         planar: whether the motion is in the plane, and so the middle row of three for the contacts' mean is left out.
-        length: unit of the first rows [m].
     """
     R, R_0 = np.empty((3, 3)), np.empty((3, 3))
     fill_rotation(path.before[3:], R_0)
-    nw, p = body.pick.shape[0], body.pivot
+    nw, p, length, pose = body.pick.shape[0], body.pivot, body.units.length, body.units.pose
     full, there = np.empty(6), np.empty(3)
     for i in range(3):
         there[i] = path.before[i] + R_0[i, 0] * p[0] + R_0[i, 1] * p[1] + R_0[i, 2] * p[2]
@@ -33,7 +32,7 @@ def fill_sticking(body, fixed, planar, length, path, rows, side):  # type: ignor
             # e_i . R (d x p) = (p x R'e_i) . d
             full[3], full[4], full[5] = cross(p[0], p[1], p[2], R[i, 0], R[i, 1], R[i, 2])
             for c in range(nw):
-                rows[t, row, c] = body.sign[c] * full[body.pick[c]] / length
+                rows[t, row, c] = body.sign[c] * pose[c] * full[body.pick[c]] / length
             off = path.position[t + 1, i] + R[i, 0] * p[0] + R[i, 1] * p[1] + R[i, 2] * p[2] - there[i]
             side[t, row] = -off / length
             row += 1
@@ -46,18 +45,19 @@ def fill_sticking(body, fixed, planar, length, path, rows, side):  # type: ignor
             full[:3] = 0.0
             full[3], full[4], full[5] = cross(u[0], u[1], u[2], s0, s1, s2)  # u . (s x d)
             for c in range(nw):
-                rows[t, row, c] = body.sign[c] * full[body.pick[c]]
+                rows[t, row, c] = body.sign[c] * pose[c] * full[body.pick[c]]
             side[t, row] = -(u[0] * s0 + u[1] * s1 + u[2] * s2)
             row += 1
 
 
 @kernel
-def fill_clearance(body, clear, length, path, rows, side):  # type: ignore[no-untyped-def]
+def fill_clearance(body, clear, path, rows, side):  # type: ignore[no-untyped-def]
     """Write rows (N, P, nq) and sides (N, P): rows d_t <= side keeps points above the lowest contact of the start.
 
     Args:
-        body: `Mechanics`.  clear: (P, 3) from the CoM, object axes [m].  length: unit of the rows [m].
+        body: `Mechanics`.  clear: (P, 3) from the CoM, object axes [m].
     """
+    length, pose = body.units.length, body.units.pose
     R = np.empty((3, 3))
     fill_rotation(path.before[3:], R)
     floor = np.inf
@@ -73,23 +73,26 @@ def fill_clearance(body, clear, length, path, rows, side):  # type: ignore[no-un
             full[2] = 1.0
             full[3], full[4], full[5] = cross(p[0], p[1], p[2], R[2, 0], R[2, 1], R[2, 2])
             for c in range(body.pick.shape[0]):
-                rows[t, k, c] = -body.sign[c] * full[body.pick[c]] / length
+                rows[t, k, c] = -body.sign[c] * pose[c] * full[body.pick[c]] / length
             height = path.position[t + 1, 2] + R[2, 0] * p[0] + R[2, 1] * p[1] + R[2, 2] * p[2] - floor
             side[t, k] = height / length
 
 
 @kernel
-def fill_tracking(body, Q, path, position, orientation, curvature, slope, error):  # type: ignore[no-untyped-def]
-    """Write the errors (N, nq) from a path's poses to desired ones, and what 1/2 e'Q e is to second order in d_t.
+def fill_tracking(body, Q, path, position, orientation, curvature, slope):  # type: ignore[no-untyped-def]
+    """Write what 1/2 e'Q e is to second order in d_t, e the errors from a path's poses to desired ones.
 
     Args:
-        body: `Mechanics`.  Q: (N, nq, nq).
+        body: `Mechanics`.  Q: (N, nq, nq), over the square of the unit of force.
         position: (N, 3), orientation: (N, 4): desired, table axes.
-        curvature: (N, nq, nq) and slope: (N, nq), out.  error: (N, nq), out.
+        curvature: (N, nq, nq) and slope: (N, nq), out.
+
+    Returns:
+        The sum of 1/2 e'Q e, over that square.
     """
-    nw = body.pick.shape[0]
+    cost, nw = 0.0, body.pick.shape[0]
     full, X = np.empty(6), np.zeros((6, 6))
-    J, QJ = np.empty((nw, nw)), np.empty((nw, nw))
+    J, QJ, error = np.empty((nw, nw)), np.empty((nw, nw)), np.empty(nw)
     unused = np.empty((3, 3))
     for i in range(3):
         X[i, i] = -1.0
@@ -99,19 +102,21 @@ def fill_tracking(body, Q, path, position, orientation, curvature, slope, error)
         full[3], full[4], full[5] = rotation_error(path.orientation[t + 1], orientation[t])
         fill_difference_jacobians(full[3:], unused, X[3:, 3:])
         for r in range(nw):
-            error[t, r] = body.sign[r] * full[body.pick[r]]
+            error[r] = body.sign[r] * full[body.pick[r]]
             for c in range(nw):
-                J[r, c] = body.sign[r] * body.sign[c] * X[body.pick[r], body.pick[c]]
+                J[r, c] = body.sign[r] * body.sign[c] * X[body.pick[r], body.pick[c]] * body.units.pose[c]
         for r in range(nw):
             for c in range(nw):
+                cost += 0.5 * error[r] * Q[t, r, c] * error[c]
                 QJ[r, c] = 0.0
                 for k in range(nw):
                     QJ[r, c] += Q[t, r, k] * J[k, c]
         for r in range(nw):
             slope[t, r] = 0.0
             for k in range(nw):
-                slope[t, r] += QJ[k, r] * error[t, k]
+                slope[t, r] += QJ[k, r] * error[k]
             for c in range(nw):
                 curvature[t, r, c] = 0.0
                 for k in range(nw):
                     curvature[t, r, c] += J[k, r] * QJ[k, c]
+    return cost

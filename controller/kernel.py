@@ -4,7 +4,15 @@ Numba hands the option `forceinline` on to whatever is compiled along the way, s
 of the interior point inlined into itself, compilation takes minutes.
 """
 
-from numba import njit
+from collections.abc import Callable
+from typing import Any
+
+from numba import guvectorize, njit
 
 kernel = njit(cache=True, error_model="numpy", forceinline=False)
 inlined = njit(cache=True, error_model="numpy", forceinline=True)  # a call with ten arrays costs 0.1 us
+
+
+def elementwise(inputs: int, layout: str) -> Callable[..., Any]:
+    """A decorator: `inputs` float arrays and an output, broadcast over all axes but those that `layout` names."""
+    return guvectorize([f"void({', '.join(['f8[:]'] * (inputs + 1))})"], layout, cache=True)

@@ -26,19 +26,17 @@ class Limits(NamedTuple):
     cone_rate: Flags
     orders: tuple[int, ...]
 
-    def sides(self, steps: int, before: Array | None) -> tuple[Array, Array]:
-        """Right-hand sides (steps, rows): the first step's rates count from the wrench `before` it, None: unknown."""
+    def first(self, before: Array | None) -> tuple[Array, Array]:
+        """Right-hand sides of the first step, whose rates count from the wrench `before` it; None: unknown."""
         out = []
         for rows, side, rate in (
             (self.linear, self.linear_side, self.linear_rate),
             (self.cone, self.cone_side, self.cone_rate),
         ):
-            many = np.tile(side, (steps, 1))
             if before is None:
-                many[0, rate & (side > 0.0)] = UNBOUNDED
+                out.append(np.where(rate & (side > 0.0), UNBOUNDED, side))
             else:
-                many[0] += rate * (rows @ before)
-            out.append(many)
+                out.append(side + rate * (rows @ before))
         return out[0], out[1]
 
 

@@ -1,11 +1,10 @@
 """Small turns: what linearises rotations, compiled, and turning by rotation vectors (Sola et al. 2018)."""
 
 import numpy as np
-from pivoting.controller.kernel import kernel
+from pivoting.controller.kernel import elementwise, kernel
 from pivoting.controller.space import rotation_error
 from pivoting.controller.validate import Array
 
-CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 _SMALL = 1e-4  # [rad]: below, the series is more accurate than the quotient
 
 
@@ -15,16 +14,15 @@ def exponential(vector: Array) -> Array:
     return np.concatenate([np.cos(0.5 * angle), 0.5 * np.sinc(angle / (2.0 * np.pi)) * vector], axis=-1)
 
 
-def rotated(orientation: Array, points: Array) -> Array:
+@elementwise(2, "(q),(v)->(v)")
+def rotated(orientation, point, out):  # type: ignore[no-untyped-def]
     """(..., 3) points turned by unit quaternions (..., 4), shapes broadcast."""
-    w, a, b, c = (orientation[..., i] for i in range(4))
-    x, y, z = (points[..., i] for i in range(3))
+    w, a, b, c = orientation[0], orientation[1], orientation[2], orientation[3]
+    x, y, z = point[0], point[1], point[2]
     t, u, v = 2.0 * (b * z - c * y), 2.0 * (c * x - a * z), 2.0 * (a * y - b * x)  # twice axis x point
-    out = np.empty((*np.broadcast_shapes(orientation.shape[:-1], points.shape[:-1]), 3))
-    out[..., 0] = x + w * t + b * v - c * u
-    out[..., 1] = y + w * u + c * t - a * v
-    out[..., 2] = z + w * v + a * u - b * t
-    return out
+    out[0] = x + w * t + b * v - c * u
+    out[1] = y + w * u + c * t - a * v
+    out[2] = z + w * v + a * u - b * t
 
 
 @kernel

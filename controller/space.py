@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.kernel import inlined, kernel
+from pivoting.controller.kernel import elementwise, inlined, kernel
 from pivoting.controller.validate import Array, array, fail
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])  # a unit quaternion's inverse, component by component
 
 
 class Motion(NamedTuple):
@@ -77,7 +78,7 @@ class Space:
 
     def angle(self, quaternion: Array) -> Array:
         """Planar angles (...) [rad] in (-pi, pi] of quaternions (..., 4) object to world."""
-        relative = quaternion_product(self.base * np.array([1.0, -1.0, -1.0, -1.0]), quaternion)
+        relative = quaternion_product(self.base * CONJUGATE, quaternion)
         turned = 2.0 * np.arctan2(-relative[..., 2], relative[..., 0])
         return np.arctan2(np.sin(turned), np.cos(turned))
 
@@ -115,17 +116,13 @@ def tilt(angle: float) -> Array:
     return np.array([np.cos(0.5 * angle), 0.0, -np.sin(0.5 * angle), 0.0])
 
 
-def quaternion_product(p: Array, q: Array) -> Array:
+@elementwise(2, "(q),(q)->(q)")
+def quaternion_product(p, q, out):  # type: ignore[no-untyped-def]
     """Hamilton product of (..., 4) quaternions (w, x, y, z)."""
-    p, q = np.asarray(p), np.asarray(q)
-    pw, px, py, pz = (p[..., i] for i in range(4))
-    qw, qx, qy, qz = (q[..., i] for i in range(4))
-    out = np.empty(np.broadcast_shapes(p.shape, q.shape))
-    out[..., 0] = pw * qw - px * qx - py * qy - pz * qz
-    out[..., 1] = pw * qx + px * qw + py * qz - pz * qy
-    out[..., 2] = pw * qy - px * qz + py * qw + pz * qx
-    out[..., 3] = pw * qz + px * qy - py * qx + pz * qw
-    return out
+    out[0] = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3]
+    out[1] = p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2]
+    out[2] = p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1]
+    out[3] = p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0]
 
 
 @inlined

@@ -19,6 +19,7 @@ from pivoting.controller.block_matrix import Indices
 from pivoting.controller.kernel import kernel
 from pivoting.controller.so3 import add_product, fill_difference_jacobians, fill_hat
 from pivoting.controller.space import cross, fill_rotation, into, rotation_error
+from pivoting.controller.units import Units
 from pivoting.controller.validate import Array
 
 INTEGRATORS = {"quasi-dynamic": (1, 0), "implicit": (2, 0), "semi-implicit": (2, 1), "forward": (2, 2)}  # order, lag
@@ -42,6 +43,7 @@ class Mechanics(NamedTuple):
     """What the compiled rows need to know; see `Belief`, but in table axes.
 
     frames: (K, 3, d) contact axes as columns.  gravity: (3,).  pick, sign: (nw,) the components of 6 that are used.
+    units: in which rows and columns are written.
     """
 
     mass: float
@@ -52,12 +54,13 @@ class Mechanics(NamedTuple):
     gravity: Array
     pick: Indices
     sign: Array
+    units: Units
 
 
 class Motion(NamedTuple):
     """towards[0] d_t + towards[1] d_{t-1} + towards[2] d_{t-2} + by_wrench w_t + by_force f_t + constant = 0.
 
-    d: corrections of the poses, (nq,) each; zero for the given pose 0. Rows in [N, N m].
+    d: corrections of the poses, (nq,) each; zero for the given pose 0. All in `Units`.
     constant: (N, nq).  towards: (3, N, nq, nq).  by_wrench: (N, nq, nw).  by_force: (N, nq, K d).
     """
 
@@ -78,11 +81,12 @@ def fill_motion(body, order, lag, h, path, wrench, force, out):  # type: ignore[
 
     Args:
         body: `Mechanics`.  order, lag: of the integrator.  h: [s].  path: `Path`.
-        wrench, force: (N, nw), (N, K d), with which the forces' dependence on the pose is linearised; zero: it is not.
+        wrench, force: (N, nw), (N, K d) [N, N m], with which the forces' dependence on the pose is linearised; zero:
+            it is not.
         out: `Motion`.
     """
     N, K, d = wrench.shape[0], body.points.shape[0], body.frames.shape[2]
-    nw = body.pick.shape[0]
+    nw, units = body.pick.shape[0], body.units
     R, hatted, turning = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     end, start, last_end, last_start = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
     spin, gyro, gain = np.empty(3), np.empty((3, 3)), np.empty((6, 6))
@@ -146,7 +150,9 @@ def fill_motion(body, order, lag, h, path, wrench, force, out):  # type: ignore[
                 full[0], full[1], full[2] = a0, a1, a2
                 full[3], full[4], full[5] = cross(p0, p1, p2, b0, b1, b2)
                 for r in range(nw):
-                    out.by_force[t, r, d * k + j] = -body.sign[r] * full[body.pick[r]]
+                    out.by_force[t, r, d * k + j] = (
+                        -body.sign[r] * full[body.pick[r]] * units.force / units.wrench[r]
+                    )
                 g0 += b0 * force[t, d * k + j]
                 g1 += b1 * force[t, d * k + j]
                 g2 += b2 * force[t, d * k + j]
@@ -159,12 +165,13 @@ def fill_motion(body, order, lag, h, path, wrench, force, out):  # type: ignore[
             for j in range(3):
                 gain[i, j] = R[i, j]
         for r in range(nw):
-            out.constant[t, r] = body.sign[r] * rows[body.pick[r]]
+            sign = body.sign[r] / units.wrench[r]
+            out.constant[t, r] = sign * rows[body.pick[r]]
             for c in range(nw):
-                s = body.sign[r] * body.sign[c]
-                out.by_wrench[t, r, c] = -s * gain[body.pick[r], body.pick[c]]
+                s = sign * body.sign[c]
+                out.by_wrench[t, r, c] = -s * units.wrench[c] * gain[body.pick[r], body.pick[c]]
                 for k in range(3):
-                    out.towards[k, t, r, c] = s * X[k, body.pick[r], body.pick[c]]
+                    out.towards[k, t, r, c] = s * units.pose[c] * X[k, body.pick[r], body.pick[c]]
         last[:] = y
         last_end[:] = end
         last_start[:] = start

@@ -55,15 +55,12 @@ def play_control(case: Scenario, attached: Attached, plan: Plan, reference: Turn
 def scenario_horizon(case: Scenario, attached: Attached, plan: Plan, steps: int | None = None) -> Horizon:
     """The scenario's horizon; `steps` in place of its own."""
     controller = attached.controller
-    unit = Horizon(controller, 1, 1.0)  # for its units
-    nq, dim = len(controller.Q_w), controller.space.dim
-    lengths = np.array([unit.length] * dim + [1.0] * (nq - dim))
     return Horizon(
         controller,
         int(case.plan_steps) if steps is None else steps,
         case.plan_step,
         integrator=case.integrator,
-        Q=case.track * np.diag((unit.unit / lengths) ** 2),
+        Q=case.track * np.diag((controller.units.force / controller.units.pose) ** 2),
         bounds=case.bounds(),
         stick=True,
         clear=_watched(attached, plan),

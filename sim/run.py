@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.plan import Plan
-from pivoting.controller.space import Space, quaternion_product, space
+from pivoting.controller.so3 import rotated
+from pivoting.controller.space import CONJUGATE, Space, quaternion_product, space
 from pivoting.models.reading import RigidBody, matrix
 from pivoting.sim.attach import Attached
 from pivoting.sim.control import BOUNDED, Event, PlanLog, plan_figures
@@ -18,7 +19,6 @@ from pivoting.sim.scenario import Scenario
 from pivoting.sim.verdict import Check, judge
 
 Array = NDArray[np.float64]
-INVERSE = np.array([1.0, -1.0, -1.0, -1.0])  # of a unit quaternion, component by component
 
 
 def _frozen(values: Array) -> Array:
@@ -115,7 +115,7 @@ class Run:
     def theta(self) -> Array:
         """(W, N+1) angle turned about the reference's axis [rad]; in the plane from the world's table."""
         axis, start = self.turn
-        turned = quaternion_product(self.quaternion, start * INVERSE)
+        turned = quaternion_product(self.quaternion, start * CONJUGATE)
         half = np.arctan2(turned[..., 1:] @ axis, turned[..., 0])
         return _frozen(np.arctan2(np.sin(2.0 * half), np.cos(2.0 * half)))
 
@@ -127,7 +127,7 @@ class Run:
     @cached_property
     def angle_error(self) -> Array:
         """(W, N+1) angle from the desired orientation [rad], with its sign about the axis."""
-        turned = quaternion_product(self.quaternion, self.desired[0] * INVERSE)
+        turned = quaternion_product(self.quaternion, self.desired[0] * CONJUGATE)
         turned *= np.where(turned[..., :1] < 0.0, -1.0, 1.0)  # the shorter way round
         size = 2.0 * np.arctan2(np.linalg.norm(turned[..., 1:], axis=-1), turned[..., 0])
         return _frozen(np.copysign(size, turned[..., 1:] @ self.turn[0]))
@@ -179,9 +179,7 @@ class Run:
 
     def _from_com(self, points: Array) -> Array:
         """(W, N+1, P, 3) points (P, 3) of the object, turned from object to table axes."""
-        q = self.quaternion[..., None, :]
-        pure = np.insert(points, 0, 0.0, axis=-1)
-        return quaternion_product(quaternion_product(q, pure), q * INVERSE)[..., 1:] @ self.table_axes
+        return rotated(self.quaternion[..., None, :], points) @ self.table_axes
 
     @cached_property
     def slip(self) -> Array:
@@ -262,5 +260,5 @@ class Run:
         times = np.concatenate([[first], self.plan.horizon.times])
         kept = times <= self.time[-1] + 1e-9
         steps = np.round(times[kept] / self.dt).astype(int)
-        turned = quaternion_product(self.quaternion[:, steps], self.plan.orientation[kept] * INVERSE)
+        turned = quaternion_product(self.quaternion[:, steps], self.plan.orientation[kept] * CONJUGATE)
         return _frozen(2.0 * np.arctan2(np.linalg.norm(turned[..., 1:], axis=-1), np.abs(turned[..., 0])))

@@ -1,0 +1,31 @@
+"""Units inside the programs: forces in weights and lengths in levers, so that what is solved is of the order of one."""
+
+from typing import NamedTuple
+
+import numpy as np
+from pivoting.controller.validate import Array
+
+
+class Units(NamedTuple):
+    """What one stands for.
+
+    force: [N] the weight, or what accelerates the object by 1 m/s^2 without gravity.
+    length: [m] the lever from the CoM to the contacts' mean, or to the farthest contact.
+    wrench: (nw,) [N, N m].  pose: (nw,) [m, rad].
+    """
+
+    force: float
+    length: float
+    wrench: Array
+    pose: Array
+
+
+def units(mass: float, gravity: Array, points: Array, dim: int) -> Units:
+    """Of an object [kg] in `gravity` (3,) [m/s^2] with contacts at `points` (K, 3) from its CoM [m]."""
+    force = mass * (float(np.linalg.norm(gravity)) or 1.0)
+    reach = float(np.linalg.norm(points.mean(axis=0)))
+    length = reach or float(np.linalg.norm(points, axis=1).max()) or 1.0
+    turns = 2 * dim - 3
+    return Units(
+        force, length, force * np.array([1.0] * dim + [length] * turns), np.array([length] * dim + [1.0] * turns)
+    )
