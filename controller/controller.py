@@ -201,7 +201,7 @@ def step_worlds(belief, work, tolerance, q, omega, q_d, omega_d, alpha_d, wrench
         work: `WrenchController.workspace()`.
         tolerance: largest relative KKT residual of status 0 (solved).
         q: (W, 4) and omega: (W, 3), the measured orientations and angular velocities, world axes.
-        q_d, omega_d, alpha_d: (4,), (3,), (3,), the reference now.
+        q_d, omega_d, alpha_d: (W, 4), (W, 3), (W, 3), the reference now; (1, ...) is the same for all worlds.
         wrench: (W, nw) out, in object axes; nan where the status is 2 (failed: no finite answer).
         force: (W, K d) out, in contact axes.
         residual: (W,) out.  status: (W,) out, int8: 0 solved, 1 inaccurate, 2 failed.
@@ -210,7 +210,8 @@ def step_worlds(belief, work, tolerance, q, omega, q_d, omega_d, alpha_d, wrench
     R, J, b = np.empty((3, 3)), np.empty((nw, n)), np.empty(nw)
     Q_w, Q_f, mu, f_min = belief.Q_w, belief.Q_f, belief.mu, belief.f_min  # taken out once: it shows in the plane
     for i in range(q.shape[0]):
-        _fill_problem(belief, q[i], omega[i], q_d, omega_d, alpha_d, R, J, b)
+        j = i % q_d.shape[0]
+        _fill_problem(belief, q[i], omega[i], q_d[j], omega_d[j], alpha_d[j], R, J, b)
         residual[i] = smallest_wrench(J, b, Q_w, Q_f, mu, f_min, force[i], wrench[i], work[0], work[1])
         if not np.isfinite(residual[i]):
             status[i] = FAILED

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.controller import WrenchController
 from pivoting.controller.polygon import polygon
-from pivoting.controller.so3 import exponential, rotated
+from pivoting.controller.so3 import rotated, turned
 from pivoting.controller.space import CONJUGATE, quaternion_product, rotation_matrix
 from pivoting.controller.transcription import INTEGRATORS, Path
 from pivoting.controller.validate import Array, array, fail, number, one_of, positive_definite, unit_quaternions
@@ -113,30 +113,36 @@ class Horizon:
     def start(self, state: BodyState) -> Path:
         """Pose 0 alone, in table axes, and how it is reached; see `Path`."""
         where, at = array("position", state.position, (3,)), unit_quaternions("orientation", state.orientation, (4,))
-        self._refuse_off_plane("orientation", at)
         velocity, omega = (array(name, getattr(state, name), (3,)) for name in ("velocity", "angular_velocity"))
         position = self.table.T @ where
-        orientation = quaternion_product(self.controller.base * CONJUGATE, at)
+        orientation = quaternion_product(self._to_table, at)
+        self._refuse_off_plane("orientation", orientation)
         rates = np.concatenate([self.table.T @ velocity, rotated(at * CONJUGATE, omega)])
         kept = self.controller.belief.wrench_map
         arriving = self.h * (kept.T @ (kept @ rates))
         before = np.concatenate([position, orientation])
         if INTEGRATORS[self.integrator][1] == 2:
             position = position + arriving[:3]
-            orientation = quaternion_product(orientation, exponential(arriving[3:]))
+            orientation = turned(orientation, arriving[3:])
         return Path(position[None], orientation[None], before, arriving)
 
+    @cached_property
+    def _to_table(self) -> Array:
+        """(4,) the world in table axes."""
+        return self.controller.base * CONJUGATE
+
     def _refuse_off_plane(self, name: str, orientation: Array) -> None:
-        relative = quaternion_product(self.controller.base * CONJUGATE, orientation)
-        if self.controller.space.dim == 2 and np.abs(relative[..., [1, 3]]).max() > 1e-6:
-            raise fail(name, orientation, "in the controller's plane, which its base gives")
+        """Raise unless orientations (..., 4) in table axes turn in its plane alone."""
+        if self.controller.space.dim == 2 and np.abs(orientation[..., 1::2]).max() > 1e-6:
+            shown = quaternion_product(self.controller.base, orientation)
+            raise fail(name, shown, "in the controller's plane, which its base gives")
 
     def height(self, state: BodyState) -> float:
         """How far the lowest of the `clear` points is above the lowest contact, over the lever; inf without any."""
         points = np.concatenate([self.controller.belief.points, self.clear])
         heights = rotated(np.asarray(state.orientation), points) @ self.table[:, 2]
-        lowest = float(heights[: len(self.controller.contacts)].min())
-        return float((heights[len(self.controller.contacts) :] - lowest).min(initial=np.inf)) / self.controller.units.length
+        contacts, others = np.split(heights, [len(self.controller.contacts)])
+        return float((others - contacts.min()).min(initial=np.inf)) / self.controller.units.length
 
     def arc(self, orientations: ArrayLike, state: BodyState) -> tuple[Array, Array]:
         """Desired poses, in world axes, that turn about the contacts where they are now: (N, 3) CoMs, (N, 4).
@@ -153,8 +159,9 @@ class Horizon:
         """Desired poses in table axes, from (N, 3) and (N, 4) in world axes."""
         c = array("positions", positions, (self.steps, 3))
         q = unit_quaternions("orientations", orientations, (self.steps, 4))
-        self._refuse_off_plane("orientations", q)
-        return np.ascontiguousarray(c @ self.table), quaternion_product(self.controller.base * CONJUGATE, q)
+        orientation = quaternion_product(self._to_table, q)
+        self._refuse_off_plane("orientations", orientation)
+        return np.ascontiguousarray(c @ self.table), orientation
 
 
 def _weights(Q: ArrayLike, steps: int, nq: int) -> Array:

@@ -13,7 +13,7 @@ from pivoting.controller.contact_set import fixed_pairs
 from pivoting.controller.horizon import Horizon
 from pivoting.controller.horizon_rows import fill_clearance, fill_sticking, fill_tracking
 from pivoting.controller.limits import friction_limits, wrench_limits
-from pivoting.controller.so3 import exponential, turn_by
+from pivoting.controller.so3 import exponential, turned
 from pivoting.controller.transcription import INTEGRATORS, Mechanics, Motion, Path, fill_motion, motion_rows
 from pivoting.controller.validate import Array
 
@@ -147,7 +147,7 @@ class HorizonProgram:
         moved = (steps[:, :nq] * units.pose) @ self._belief.wrench_map
         position, orientation = guess.path.position.copy(), guess.path.orientation.copy()
         position[1:] += moved[:, :3]
-        turn_by(orientation[1:], moved[:, 3:])
+        orientation[1:] = turned(orientation[1:], moved[:, 3:])
         change = steps.copy()
         change[:, nq : 2 * nq] -= guess.wrench / units.wrench
         change[:, 2 * nq :] -= guess.force / units.force

@@ -1,9 +1,9 @@
 """Planning: the horizon's program solved, stated again about its own answer until that changes no more, and judged."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 from pivoting.controller.conic_program import ClarabelInPlace, Solver, kkt_residual, solver
@@ -128,22 +128,21 @@ class Planner:
 
         None: about where the object is, which is further from the answer, but always keeps contacts where they are.
         """
-        start, N, belief = self.horizon.start(state), self.horizon.steps, self.horizon.controller.belief
-        if desired is None:
-            still = np.repeat(start.position, N, axis=0), np.repeat(start.orientation, N, axis=0)
-        else:
-            still = self.horizon.desired(*desired)
-        return self._from(start, still, np.zeros((N, len(belief.Q_w))), np.zeros((N, len(belief.Q_f))))
+        start = self.horizon.start(state)
+        return self._about(start, _still(start) if desired is None else self.horizon.desired(*desired))
 
-    def _from(self, start: Path, poses: tuple[Array, Array], wrench: Array, force: Array) -> Guess:
-        """A guess of poses 1 to N, (N, 3) and (N, 4) in table axes, that begins where the object is."""
-        path = start._replace(
-            position=np.concatenate([start.position, poses[0]]),
-            orientation=np.concatenate([start.orientation, poses[1]]),
-        )
-        return Guess(path, np.array(wrench), np.array(force))
+    def _about(self, start: Path, poses: tuple[Array, Array], forces: tuple[Array, Array] | None = None) -> Guess:
+        """A guess of poses 1 to N, (N, 3) and (N, 4) in table axes or one for all, that begins where the object is."""
+        N, belief = self.horizon.steps, self.horizon.controller.belief
+        position, orientation = np.empty((N + 1, 3)), np.empty((N + 1, 4))
+        position[0], orientation[0] = start.position[0], start.orientation[0]
+        position[1:], orientation[1:] = poses
+        path = start._replace(position=position, orientation=orientation)
+        shapes = (N, len(belief.Q_w)), (N, len(belief.Q_f))
+        given = [np.zeros(shape) for shape in shapes] if forces is None else [np.array(values) for values in forces]
+        return Guess(path, *given)
 
-    def _begun(self, guess: Guess, state: BodyState) -> Guess:
+    def _begun(self, guess: Guess, start: Path) -> Guess:
         """A guess that was made for another state, from this one."""
         N, belief = self.horizon.steps, self.horizon.controller.belief
         if not isinstance(guess, Guess):
@@ -152,8 +151,7 @@ class Planner:
         wanted = ((N + 1, 3), (N + 1, 4), (N, len(belief.Q_w)), (N, len(belief.Q_f)))
         if shapes != wanted:
             raise fail("guess", f"one of shapes {shapes}", f"of shapes {wanted}")
-        poses = guess.path.position[1:], guess.path.orientation[1:]
-        return self._from(self.horizon.start(state), poses, guess.wrench, guess.force)
+        return self._about(start, (guess.path.position[1:], guess.path.orientation[1:]), (guess.wrench, guess.force))
 
     def plan(
         self,
@@ -161,6 +159,7 @@ class Planner:
         desired: tuple[Array, Array],
         *,
         guess: Guess | None = None,
+        forces: tuple[Array, Array] | None = None,
         applied: Array | None = None,
         passes: int = 50,
         tolerance: float = CONVERGED,
@@ -172,6 +171,7 @@ class Planner:
         Args:
             guess: about which the first program is stated; it begins at `state` whatever it began at before. None: the
                 desired poses, and if there is no answer about those, which may be far away, where the object is.
+            forces: (N, nw), (N, K d), in place of a guess: about the desired poses alone, with these wrenches.
             applied: see `HorizonProgram.stated`.
             passes: at most so many programs; with 1 the answer is that of the program about the guess.
         """
@@ -185,45 +185,72 @@ class Planner:
         if applied is not None:
             applied = array("applied", applied, (len(self.horizon.controller.Q_w),))
         began = perf_counter()
-        wanted = self.horizon.desired(*desired)
-        guesses: list[Callable[[], Guess]] = [lambda: self.guess(state, desired), lambda: self.guess(state)]
+        start, wanted = self.horizon.start(state), self.horizon.desired(*desired)
         if guess is not None:
-            given = guess
-            guesses = [lambda: self._begun(given, state)]
+            guesses = [self._begun(guess, start)]
+        elif forces is not None:
+            guesses = [self._about(start, wanted, forces)]
+        else:
+            guesses = [self._about(start, wanted), self._about(start, _still(start))]
         inside, tried = 0.0, 0
-        for make in guesses:
-            now, changes = make(), []
-            for _ in range(passes):
-                program = self.program.stated(wanted, now, applied)
-                answer = self._solve(program)
-                inside, tried = inside + answer.seconds, tried + 1
-                residual, said = kkt_residual(program, answer), answer.said
-                if not residual <= RESIDUAL:
-                    if "infeasible" not in said.lower() and self.method != "clarabel":  # few backends prove it
-                        said = f"{said}; clarabel: {ClarabelInPlace()(program).said}"
-                    status = "infeasible" if "infeasible" in said.lower() else "failed"
-                    break
-                now, change = self.program.corrected(now, answer.x)
-                changes.append(change)
-                status = "solved" if change <= tolerance else "not converged"
-                if status == "solved":
-                    break
-            if changes:
+        for now in guesses:
+            found = self._passes(now, wanted, applied, int(passes), tolerance)
+            inside, tried = inside + found.seconds, tried + found.tried
+            if found.changes:
                 break
-        motion, stick = self.program.defects(now)
-        for values in (now.wrench, now.force):
+        motion, stick = self.program.defects(found.guess)
+        for values in (found.guess.wrench, found.guess.force):
             values.flags.writeable = False
         return Plan(
             self.horizon,
-            now,
-            status=status,
-            said=said,
+            found.guess,
+            status=found.status,
+            said=found.said,
             passes=tried,
-            changes=tuple(changes),
-            residual=residual,
+            changes=tuple(found.changes),
+            residual=found.residual,
             motion_defect=motion,
             stick_defect=stick,
-            objective=self.program.objective(wanted, now),
+            objective=self.program.objective(wanted, found.guess),
             seconds=perf_counter() - began,
             solver_seconds=inside,
         )
+
+    def _passes(
+        self, now: Guess, wanted: tuple[Array, Array], applied: Array | None, passes: int, tolerance: float
+    ) -> "_Passes":
+        """Solve programs about a guess, and about each answer, until that changes no more or there is none."""
+        inside, tried, changes = 0.0, 0, []
+        for _ in range(passes):
+            program = self.program.stated(wanted, now, applied)
+            answer = self._solve(program)
+            inside, tried = inside + answer.seconds, tried + 1
+            residual, said = kkt_residual(program, answer), answer.said
+            if not residual <= RESIDUAL:
+                if "infeasible" not in said.lower() and self.method != "clarabel":  # few backends prove it
+                    said = f"{said}; clarabel: {ClarabelInPlace()(program).said}"
+                status = "infeasible" if "infeasible" in said.lower() else "failed"
+                break
+            now, change = self.program.corrected(now, answer.x)
+            changes.append(change)
+            status = "solved" if change <= tolerance else "not converged"
+            if status == "solved":
+                break
+        return _Passes(now, status, said, tried, changes, residual, inside)
+
+
+class _Passes(NamedTuple):
+    """Where passes ended; see `Plan`."""
+
+    guess: Guess
+    status: str
+    said: str
+    tried: int
+    changes: list[float]
+    residual: float
+    seconds: float
+
+
+def _still(start: Path) -> tuple[Array, Array]:
+    """The pose of a path that has one."""
+    return start.position[0], start.orientation[0]

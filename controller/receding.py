@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 from pivoting.controller.horizon import BodyState
-from pivoting.controller.horizon_program import Guess
 from pivoting.controller.plan import Plan, Planner
 from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product
@@ -70,9 +69,8 @@ class RecedingHorizon:
         desired = horizon.arc(orientations, state)
         attempt = None
         if last is not None and last.plan is not None and last.outcome == "planned":
-            shifted = _shifted(last.plan, (last.since + self.period) / horizon.h)
-            guess = shifted._replace(path=self.planner.guess(state, desired).path)
-            attempt = self.planner.plan(state, desired, guess=guess, applied=applied, passes=self.passes)
+            forces = _shifted(last.plan, (last.since + self.period) / horizon.h)
+            attempt = self.planner.plan(state, desired, forces=forces, applied=applied, passes=self.passes)
         if attempt is None or attempt.status not in FOUND:
             attempt = self.planner.plan(state, desired, applied=applied, passes=3 * self.passes)
         if attempt.status in FOUND:
@@ -83,11 +81,11 @@ class RecedingHorizon:
         return Followed(last.plan, since, "shifted", attempt)
 
 
-def _shifted(plan: Plan, steps: float) -> Guess:
-    """Wrenches and forces of a plan from `steps` on, the last ones repeated."""
+def _shifted(plan: Plan, steps: float) -> tuple[Array, Array]:
+    """Wrenches (N, nw) and forces (N, K d) of a plan from `steps` on, the last ones repeated."""
     N = len(plan.wrench)
     index = np.minimum(np.arange(N) + round(steps), N - 1)
-    return plan.guess._replace(wrench=plan.guess.wrench[index], force=plan.guess.force[index])
+    return plan.guess.wrench[index], plan.guess.force[index]
 
 
 def followed_motion(followed: Followed, state: BodyState, times: Array) -> tuple[Array, Array, Array]:
@@ -104,20 +102,19 @@ def followed_motion(followed: Followed, state: BodyState, times: Array) -> tuple
         still = np.zeros((len(times), 3))
         return np.tile(state.orientation, (len(times), 1)), still, still.copy()
     h, N = plan.horizon.h, plan.horizon.steps
-    rates = plan.angular_velocity
-    if INTEGRATORS[plan.horizon.integrator][0] == 1:
-        rates = np.concatenate([rates[1:], rates[-1:]])
-        steps = np.zeros((N, 3))
-    else:
-        steps = np.diff(rates, axis=0) / h
-    begun = plan.guess.path.before[3:]
     at = np.clip(followed.since + times, 0.0, N * h)
     index = np.minimum((at / h + 1e-9).astype(int), N - 1)
-    nodes = np.empty((index[-1] + 1, 4))
-    nodes[0] = quaternion_product(plan.horizon.controller.base, begun)
-    turns = rates[:-1] * h + 0.5 * steps * h**2  # world axes, each about an axis that hardly turns within a step
-    for t in range(index[-1]):
-        nodes[t + 1] = quaternion_product(exponential(turns[t]), nodes[t])
+    last = index.max() + 1
+    rates = plan.angular_velocity[: last + 1]
+    if INTEGRATORS[plan.horizon.integrator][0] == 1:
+        rates, growth = rates[1:], np.zeros((last, 3))
+    else:
+        growth = np.diff(rates, axis=0) / h
+    nodes = np.empty((last, 4))
+    nodes[0] = quaternion_product(plan.horizon.controller.base, plan.guess.path.before[3:])
+    for t in range(last - 1):  # world axes, each about an axis that hardly turns within a step
+        nodes[t + 1] = quaternion_product(exponential((rates[t] + 0.5 * growth[t] * h) * h), nodes[t])
     tau = (at - index * h)[:, None]
-    turned = quaternion_product(exponential(rates[index] * tau + 0.5 * steps[index] * tau**2), nodes[index])
-    return turned, rates[index] + steps[index] * tau, steps[index]
+    grown = growth[index]
+    orientation = quaternion_product(exponential((rates[index] + 0.5 * grown * tau) * tau), nodes[index])
+    return orientation, rates[index] + grown * tau, grown

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 from pivoting.controller.references import MinimumJerk, Reference
+from pivoting.controller.so3 import exponential
 from pivoting.controller.space import Motion, quaternion_product, rotation_error, rotation_matrix
 from pivoting.controller.validate import Array, array, fail, number
 
@@ -41,8 +42,8 @@ class Turn:
 
     def __call__(self, times: Array) -> Motion:
         angle, rate, acceleration = (np.asarray(values, dtype=float)[..., None] for values in self.angle(times))
-        turned = np.concatenate([np.cos(0.5 * angle), np.sin(0.5 * angle) * self.axis], axis=-1)
-        return Motion(quaternion_product(turned, self.start), rate * self.axis, acceleration * self.axis)
+        turned = quaternion_product(exponential(angle * self.axis), self.start)
+        return Motion(turned, rate * self.axis, acceleration * self.axis)
 
 
 @dataclass(frozen=True, eq=False)

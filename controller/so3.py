@@ -2,16 +2,24 @@
 
 import numpy as np
 from pivoting.controller.kernel import elementwise, kernel
-from pivoting.controller.space import rotation_error
+from pivoting.controller.space import IDENTITY, rotation_error
 from pivoting.controller.validate import Array
 
 _SMALL = 1e-4  # [rad]: below, the series is more accurate than the quotient
 
 
-def exponential(vector: Array) -> Array:
-    """(..., 4) unit quaternions of rotation vectors (..., 3) [rad]."""
-    angle = np.linalg.norm(vector, axis=-1, keepdims=True)
-    return np.concatenate([np.cos(0.5 * angle), 0.5 * np.sinc(angle / (2.0 * np.pi)) * vector], axis=-1)
+@elementwise(2, "(q),(v)->(q)")
+def turned(orientation, vector, out):  # type: ignore[no-untyped-def]
+    """(..., 4) unit quaternions turned by rotation vectors (..., 3) [rad] in the object's own axes."""
+    x, y, z = vector[0], vector[1], vector[2]
+    angle = np.sqrt(x * x + y * y + z * z)
+    scale = 0.5 if angle < 1e-9 else np.sin(0.5 * angle) / angle
+    x, y, z, w = scale * x, scale * y, scale * z, np.cos(0.5 * angle)
+    a, b, c, d = orientation[0], orientation[1], orientation[2], orientation[3]
+    q0, q1 = a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y
+    q2, q3 = a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w
+    length = np.sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
+    out[0], out[1], out[2], out[3] = q0 / length, q1 / length, q2 / length, q3 / length
 
 
 @elementwise(2, "(q),(v)->(v)")
@@ -25,20 +33,9 @@ def rotated(orientation, point, out):  # type: ignore[no-untyped-def]
     out[2] = z + w * v + a * u - b * t
 
 
-@kernel
-def turn_by(orientation, vector):  # type: ignore[no-untyped-def]
-    """Turn quaternions (N, 4), in place, by rotation vectors (N, 3) in the object's own axes; unit length again."""
-    for i in range(orientation.shape[0]):
-        x, y, z = vector[i, 0], vector[i, 1], vector[i, 2]
-        angle = np.sqrt(x * x + y * y + z * z)
-        scale = 0.5 if angle < 1e-9 else np.sin(0.5 * angle) / angle
-        x, y, z, w = scale * x, scale * y, scale * z, np.cos(0.5 * angle)
-        a, b, c, d = orientation[i]
-        q0, q1 = a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y
-        q2, q3 = a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w
-        length = np.sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
-        orientation[i, 0], orientation[i, 1] = q0 / length, q1 / length
-        orientation[i, 2], orientation[i, 3] = q2 / length, q3 / length
+def exponential(vector: Array) -> Array:
+    """(..., 4) unit quaternions of rotation vectors (..., 3) [rad]."""
+    return turned(IDENTITY, vector)
 
 
 @kernel

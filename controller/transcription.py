@@ -150,9 +150,7 @@ def fill_motion(body, order, lag, h, path, wrench, force, out):  # type: ignore[
                 full[0], full[1], full[2] = a0, a1, a2
                 full[3], full[4], full[5] = cross(p0, p1, p2, b0, b1, b2)
                 for r in range(nw):
-                    out.by_force[t, r, d * k + j] = (
-                        -body.sign[r] * full[body.pick[r]] * units.force / units.wrench[r]
-                    )
+                    out.by_force[t, r, d * k + j] = -body.sign[r] * full[body.pick[r]] * units.force / units.wrench[r]
                 g0 += b0 * force[t, d * k + j]
                 g1 += b1 * force[t, d * k + j]
                 g2 += b2 * force[t, d * k + j]

@@ -5,7 +5,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.bounded import BoundedSolver
-from pivoting.controller.bounds import WrenchBounds
+from pivoting.controller.bounds import WrenchBounds, fill_excess
 from pivoting.controller.controller import WrenchController, step_worlds
 from pivoting.controller.horizon import BodyState
 from pivoting.controller.plan import Plan, PlanError, Planner
@@ -61,7 +61,7 @@ class LawControl:
         self._belief, self._work, self._desired = controller.belief, controller.workspace(), desired
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
-        now = [values[k] for values in self._desired]
+        now = [values[k : k + 1] for values in self._desired]
         step_worlds(self._belief, self._work, TOLERANCE, states.orientation, states.angular_velocity, *now, *out)
 
     def prepare(self, states: States, out: Answers) -> None:
@@ -77,17 +77,17 @@ class BoundedControl:
     """
 
     def __init__(self, inner: Control, controller: WrenchController, bounds: WrenchBounds, dt: float):
-        self._inner, self._controller, self._bounds, self._dt = inner, controller, bounds, dt
+        self._inner, self._controller, self._dt = inner, controller, dt
+        self._bounds = bounds.stacked(len(controller.Q_w))
         self._solve = BoundedSolver(controller, bounds, dt)
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
         self._inner(k, states, before, out)
-        for i in range(len(out.wrench)):
-            last = None if before is None else np.nan_to_num(before[i])  # no answer: none was applied
-            if not self._bounds.excess(out.wrench[i], last, self._dt) > OVER:
-                continue
-            jacobian = self._controller.jacobian(states.orientation[i])
-            answer = self._solve(states.orientation[i], jacobian @ out.force[i] + out.wrench[i], last)
+        last, excess = _applied(before), np.empty(len(out.wrench))
+        fill_excess(self._bounds, out.wrench, out.wrench if last is None else last, self._dt, excess)
+        for i in np.flatnonzero(excess > OVER):
+            required = self._controller.jacobian(states.orientation[i]) @ out.force[i] + out.wrench[i]
+            answer = self._solve(states.orientation[i], required, None if last is None else last[i])
             if not answer.residual <= USABLE:
                 out.wrench[i], out.status[i] = np.nan, FAILED
                 continue
@@ -103,6 +103,11 @@ class BoundedControl:
         for _ in range(2):  # set up, then in place
             jacobian = self._controller.jacobian(states.orientation[0])
             self._solve(states.orientation[0], jacobian @ out.force[0] + out.wrench[0])
+
+
+def _applied(wrench: Array | None) -> Array | None:
+    """Wrenches (W, nw) as they were applied: none where there was no answer."""
+    return None if wrench is None else np.where(np.isfinite(wrench), wrench, 0.0)
 
 
 class PlanLog(NamedTuple):
@@ -166,56 +171,55 @@ class HorizonControl:
         self._belief, self._work = controller.belief, controller.workspace()
         W, P = len(horizons), -(-steps // every)
         self._followed: list[Followed | None] = [None] * W
-        self._motions = np.empty((W, every, 4)), np.empty((W, every, 3)), np.empty((W, every, 3))
+        self._released = np.zeros(W, dtype=bool)
+        self._motions = np.empty((every, W, 4)), np.empty((every, W, 3)), np.empty((every, W, 3))
+        self._times: Array = dt * np.arange(every, dtype=float)
         self.log = PlanLog(
             every * np.arange(P), np.zeros((W, P), np.int8), *(np.full((W, P), np.nan) for _ in range(5))
         )
         self.events: list[Event] = []
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
-        for i in range(len(out.wrench)):
-            if k % self._every == 0:
-                self._plan(i, k, states, before)
-            self._follow(i, k, states, out)
+        if k % self._every == 0:
+            wanted, applied = self._wanted(k), _applied(before)
+            for i in range(len(out.wrench)):
+                self._plan(i, k, states, wanted, None if applied is None else applied[i])
+        self._follow(k, states, out)
 
     def prepare(self, states: States, out: Answers) -> None:
         """Compile, and set the first world's solver up."""
         state = BodyState(*(np.array(values[0]) for values in states))
         for _ in range(2):
             self._horizons[0].replan(state, self._wanted(0), None)
-        self._motions[0][:], self._motions[1][:], self._motions[2][:] = state.orientation, 0.0, 0.0
-        self._follow(0, 0, states, out)
+        for values, still in zip(self._motions, (state.orientation, np.zeros(3), np.zeros(3)), strict=True):
+            values[:] = still
+        self._follow(0, states, out)
 
-    def _follow(self, i: int, k: int, states: States, out: Answers) -> None:
-        """The per-step law of world i; nothing, where the object was let go."""
-        followed = self._followed[i]
-        if followed is not None and followed.outcome == "released":
+    def _follow(self, k: int, states: States, out: Answers) -> None:
+        """The per-step law; nothing, where the object was let go."""
+        now = [values[k % self._every] for values in self._motions]
+        step_worlds(self._belief, self._work, TOLERANCE, states.orientation, states.angular_velocity, *now, *out)
+        if self._released.any():
             for values in out:
-                values[i] = 0
-            return
-        now = [values[i, k % self._every] for values in self._motions]
-        one = [values[i : i + 1] for values in (states.orientation, states.angular_velocity)]
-        step_worlds(self._belief, self._work, TOLERANCE, *one, *now, *(values[i : i + 1] for values in out))
+                values[self._released] = 0
 
     def _wanted(self, k: int) -> Array:
         """(N, 4) desired orientations over the horizon that begins at step k."""
         times = k * self._dt + self._horizons[0].planner.horizon.times
         return np.asarray(self._reference(times).orientation)
 
-    def _plan(self, i: int, k: int, states: States, before: Array | None) -> None:
+    def _plan(self, i: int, k: int, states: States, wanted: Array, applied: Array | None) -> None:
         state = BodyState(*(np.array(values[i]) for values in states))
         if not all(np.isfinite(values).all() for values in state):
             return  # the world has diverged: its law will say so
-        applied = None if before is None else np.nan_to_num(before[i])
         last = self._followed[i]
-        now = self._horizons[i].replan(state, self._wanted(k), last, applied)
-        self._followed[i] = now
+        now = self._horizons[i].replan(state, wanted, last, applied)
+        self._followed[i], self._released[i] = now, now.outcome == "released"
         self.log.outcome[i, k // self._every] = OUTCOMES.index(now.outcome)
         if now is last:  # let go: there was no plan
             return
-        times: Array = self._dt * np.arange(self._every, dtype=float)
-        for values, motion in zip(self._motions, followed_motion(now, state, times), strict=True):
-            values[i] = motion
+        for values, motion in zip(self._motions, followed_motion(now, state, self._times), strict=True):
+            values[:, i] = motion
         tried, p = now.attempt, k // self._every
         change = tried.changes[-1] if tried.changes else np.nan
         self.log.residual[i, p], self.log.change[i, p], self.log.ms[i, p] = tried.residual, change, 1e3 * tried.seconds

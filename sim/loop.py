@@ -10,6 +10,7 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 from pivoting.controller.controller import WrenchController, world_wrench
 from pivoting.controller.rotations import Turn
+from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product, space
 from pivoting.controller.validate import fail
 from pivoting.models.reading import RigidBody, matrix, place, read_friction, turn
@@ -153,8 +154,7 @@ def _start(
     lever = float(np.linalg.norm(body.com - point) + plan.radius[0])
     at = plan.at + (plan.radius[0] - START_DEPTH * lever) * up
     for qpos, qvel, error in zip(batch.bind("qpos"), batch.bind("qvel"), errors, strict=True):
-        off = np.concatenate([[np.cos(0.5 * error)], np.sin(0.5 * error) * plan.axis])
-        place(model, data, body, quaternion_product(off, desired[0][0]), point, at)
+        place(model, data, body, quaternion_product(exponential(error * plan.axis), desired[0][0]), point, at)
         touching = point - plan.radius[0] * up @ data.xmat[body.index].reshape(3, 3)
         turn(model, data, body, desired[1][0], touching)
         qpos[:], qvel[:] = data.qpos, data.qvel

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product
 from pivoting.models.candidates import Stance, planar_stance, stance, support_points
 from pivoting.models.reading import ModelError, RigidBody, matrix, quaternion, read_body
@@ -63,8 +64,7 @@ def planned(case: Scenario, model: mujoco.MjModel) -> Plan:
     lands = case.limits.contacts_end > 0
     limits = (low if lands else low + gap, high - gap)
     if case.about == "yaw":
-        turned = np.concatenate([[np.cos(0.5 * found.balance)], np.sin(0.5 * found.balance) * axis])
-        start, axis = matrix(quaternion_product(turned, quaternion(start))), table[:, 2]
+        start, axis = matrix(quaternion_product(exponential(found.balance * axis), quaternion(start))), table[:, 2]
         limits = (-2.0 * np.pi, 2.0 * np.pi)
     # the object starts where its file has it: the first contact is put under the place that it has there
     there = data.xpos[body.index] + now @ found.points[0] - body.origin

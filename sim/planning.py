@@ -6,6 +6,7 @@ from pivoting.controller.horizon import Horizon
 from pivoting.controller.plan import Planner
 from pivoting.controller.receding import RecedingHorizon
 from pivoting.controller.rotations import Turn
+from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product
 from pivoting.controller.validate import fail
 from pivoting.models.candidates import contact_points
@@ -78,8 +79,7 @@ def _watched(attached: Attached, plan: Plan) -> Array:
     size = float(np.linalg.norm(np.ptp(corners, axis=0)))
     up, watched = matrix(body.table)[:, 2], np.zeros(len(corners), dtype=bool)
     for angle in plan.range:
-        turned = np.concatenate([[np.cos(0.5 * angle)], np.sin(0.5 * angle) * plan.axis])
-        R = matrix(quaternion_product(turned, plan.start))
+        R = matrix(quaternion_product(exponential(angle * plan.axis), plan.start))
         watched |= (corners - contacts[0]) @ R.T @ up < NEAR * size
     away = np.linalg.norm(corners[:, None] - contacts, axis=2).min(axis=1) > 1e-9 * size
     return corners[watched & away]

@@ -14,6 +14,11 @@ BLOCK = WrenchController(
 )
 
 
+def at(desired: Motion) -> list[np.ndarray]:
+    """The same reference for all worlds."""
+    return [values[None] for values in BLOCK.space.lift_motion(desired)]
+
+
 def test_many_worlds_are_as_many_problems() -> None:
     rng = np.random.default_rng(4)
     thetas, omegas = rng.uniform(0.1, 1.4, 50), rng.normal(size=50)
@@ -21,7 +26,7 @@ def test_many_worlds_are_as_many_problems() -> None:
     wrench, force, residual, status = np.empty((50, 3)), np.empty((50, 2)), np.empty(50), np.empty(50, np.int8)
     q, omega = BLOCK.space.orientation(thetas), BLOCK.space.axial(omegas)
     out = (wrench, force, residual, status)
-    step_worlds(BLOCK.belief, BLOCK.workspace(), 1e-9, q, omega, *BLOCK.space.lift_motion(desired), *out)
+    step_worlds(BLOCK.belief, BLOCK.workspace(), 1e-9, q, omega, *at(desired), *out)
     assert not status.any()
     for i in range(50):
         solution = solve(BLOCK.problem(Motion(thetas[i], omegas[i]), desired))
@@ -35,7 +40,7 @@ def test_a_state_that_is_not_a_number_has_no_answer_and_applies_nothing() -> Non
     omega = np.zeros((2, 3))
     wrench, force, residual, status = np.ones((2, 3)), np.ones((2, 2)), np.zeros(2), np.zeros(2, np.int8)
     out = (wrench, force, residual, status)
-    step_worlds(BLOCK.belief, BLOCK.workspace(), 1e-9, q, omega, *BLOCK.space.lift_motion(Motion(0.5)), *out)
+    step_worlds(BLOCK.belief, BLOCK.workspace(), 1e-9, q, omega, *at(Motion(0.5)), *out)
     assert status.tolist() == [0, 2]
     assert np.isnan(wrench[1]).all()
     applied = np.ones((2, 6))
@@ -48,7 +53,7 @@ def test_a_tolerance_that_is_not_met_is_a_status() -> None:
     q, omega = BLOCK.space.orientation(np.array([0.5])), np.zeros((1, 3))
     wrench, force, residual, status = np.ones((1, 3)), np.ones((1, 2)), np.zeros(1), np.zeros(1, np.int8)
     out = (wrench, force, residual, status)
-    step_worlds(BLOCK.belief, BLOCK.workspace(), -1.0, q, omega, *BLOCK.space.lift_motion(Motion(0.5)), *out)
+    step_worlds(BLOCK.belief, BLOCK.workspace(), -1.0, q, omega, *at(Motion(0.5)), *out)
     assert status.tolist() == [1]
 
 
