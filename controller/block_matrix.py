@@ -54,26 +54,30 @@ class BlockMatrix:
         slots = np.empty(len(order), dtype=np.int64)
         slots[order] = np.arange(len(order))
         self._data = np.zeros(len(order))
-        self._changing: list[tuple[Indices, Indices]] = []  # slots (S, entries of a block), and these entries
+        self._slots: tuple[Indices, ...] = ()  # of each part that changes: (S, entries of a block)
+        self._entries: tuple[Indices, ...] = ()  # of a block
         for part, where in zip(parts, np.split(slots, np.cumsum(counts)[:-1]), strict=True):
             entries = np.flatnonzero(part.mask)
             where = where.reshape(len(part.rows), len(entries))
             if part.still is None:
-                self._changing.append((where, entries))
+                self._slots, self._entries = (*self._slots, where), (*self._entries, entries)
             else:
                 self._data[where] = part.still.ravel()[entries]
 
-    def filled(self, values: list[Array]) -> Sparse:
+    def filled(self, values: tuple[Array, ...]) -> Sparse:
         """The matrix, from one array (S, r, c) for each part that changes."""
         data = self._data.copy()
-        for (slots, entries), blocks in zip(self._changing, values, strict=True):
-            if slots.size:  # no blocks at all, where N = 1 and they belong to the step before, are (0, r, c)
-                _scatter(slots, entries, blocks.reshape(len(slots), -1), data)
+        if len(values) != len(self._slots):
+            raise ValueError(f"{len(values)} arrays for {len(self._slots)} parts that change")
+        if values:
+            _scatter(self._slots, self._entries, values, data)
         return Sparse(data, self._indices, self._indptr, self.shape)
 
 
 @kernel
-def _scatter(slots, entries, blocks, data):  # type: ignore[no-untyped-def]
-    for s in range(slots.shape[0]):
-        for e in range(slots.shape[1]):
-            data[slots[s, e]] = blocks[s, entries[e]]
+def _scatter(slots, entries, values, data):  # type: ignore[no-untyped-def]
+    for k in range(len(values)):
+        width = values[k].shape[2]
+        for s in range(slots[k].shape[0]):
+            for e in range(slots[k].shape[1]):
+                data[slots[k][s, e]] = values[k][s, entries[k][e] // width, entries[k][e] % width]

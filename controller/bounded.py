@@ -14,9 +14,9 @@ from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.conic_program import ClarabelInPlace, Cones, ConicProgram, kkt_residual
 from pivoting.controller.contact_set import free_axes
 from pivoting.controller.controller import WrenchController
+from pivoting.controller.kernel import kernel
 from pivoting.controller.limits import friction_limits, wrench_limits
-from pivoting.controller.so3 import fill_hat
-from pivoting.controller.space import rotation_matrix
+from pivoting.controller.space import component, cross, fill_rotation, into
 from pivoting.controller.validate import Array, number
 
 GIVE_UP, BREAK = 1e2, 1e4  # rho_a and rho_s, in weights: far above any multiplier of an answer that is worth having
@@ -93,7 +93,7 @@ class BoundedSolver:
         P[np.ix_(f, f)] = belief.Q_f
         P[np.ix_(w, w)] = self._scale[:, None] * belief.Q_w * self._scale / self._unit**2
         P, every = np.triu(P), np.arange(wide)[None]
-        self._P = BlockMatrix((wide, wide), [Part(every, every, P != 0.0, P)]).filled([])
+        self._P = BlockMatrix((wide, wide), [Part(every, every, P != 0.0, P)]).filled(())
         self._q = np.zeros(wide)
         self._q[t_a], self._q[t_s] = GIVE_UP, BREAK
         self._solve = ClarabelInPlace()
@@ -108,12 +108,14 @@ class BoundedSolver:
         """
         nw, n = len(self._scale), len(self._belief.Q_f)
         jacobian = self._controller.jacobian(orientation)
-        changing = [(jacobian * self._unit / self._scale[:, None])[None], -self._turning(orientation)[None]]
+        scaled = jacobian * self._unit / self._scale[:, None]
         last = None if before is None else np.asarray(before, dtype=float) / self._scale
         linear, cone = self._bounds.first(last)
         own_linear, own_cone, rest = self._sides
         b = np.concatenate([required / self._scale, own_linear, linear, own_cone, cone, rest])
-        program = ConicProgram(self._P, self._q, self._A.filled(changing), b, self._cones)
+        turning = np.empty((nw, len(self._axes)))
+        _fill_turning(self._axes, np.array(orientation), self._belief, self._scale, turning)
+        program = ConicProgram(self._P, self._q, self._A.filled((scaled[None], turning[None])), b, self._cones)
         answer = self._solve(program)
         residual = kkt_residual(program, answer)
         if not residual <= POOR:  # scaled for another problem: begin anew, and keep the better of the two
@@ -128,11 +130,26 @@ class BoundedSolver:
             wrench, force.reshape(len(self._belief.mu), -1), lacking, residual, exact
         )  # fmt: skip
 
-    def _turning(self, orientation: Array) -> Array:
-        """(nw, A) B, the wrenches that accelerate the object about its free axes, with entries up to 1."""
-        belief = self._belief
-        lever, hat = belief.pivot + rotation_matrix(orientation).T @ belief.offset, np.empty((3, 3))
-        fill_hat(*-lever, hat)
-        push = np.hstack([belief.mass * self._axes @ hat, self._axes @ belief.inertia])  # a x (-lever) = a hat(-lever)
-        B = belief.wrench_map @ push.T / self._scale[:, None]
-        return B / max(1e-300, float(np.abs(B).max(initial=0.0)))
+
+@kernel
+def _fill_turning(axes, q, belief, scale, out):  # type: ignore[no-untyped-def]
+    """Write -B (nw, A), the wrenches that accelerate the object about its free axes, with entries up to 1, in `scale`.
+
+    Args:
+        axes: (A, 3) object axes.  q: (4,) object axes to world.
+    """
+    R, p, o, inertia = np.empty((3, 3)), belief.pivot, belief.offset, belief.inertia
+    fill_rotation(q, R)
+    o0, o1, o2 = into(R, o[0], o[1], o[2])
+    most = 1e-300
+    for j in range(axes.shape[0]):
+        a0, a1, a2 = axes[j]
+        F0, F1, F2 = cross(a0, a1, a2, p[0] + o0, p[1] + o1, p[2] + o2)  # minus the acceleration of the CoM
+        M0 = -(inertia[0, 0] * a0 + inertia[0, 1] * a1 + inertia[0, 2] * a2)
+        M1 = -(inertia[1, 0] * a0 + inertia[1, 1] * a1 + inertia[1, 2] * a2)
+        M2 = -(inertia[2, 0] * a0 + inertia[2, 1] * a1 + inertia[2, 2] * a2)
+        m = belief.mass
+        for row in range(out.shape[0]):
+            out[row, j] = component(belief.wrench_map, row, m * F0, m * F1, m * F2, M0, M1, M2) / scale[row]
+            most = max(most, abs(out[row, j]))
+    out /= most

@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike
 from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.controller import WrenchController
 from pivoting.controller.polygon import polygon
-from pivoting.controller.so3 import rotated, turned
+from pivoting.controller.so3 import rotated
 from pivoting.controller.space import CONJUGATE, quaternion_product, rotation_matrix
-from pivoting.controller.transcription import INTEGRATORS, Path
+from pivoting.controller.transcription import INTEGRATORS, Path, fill_start
 from pivoting.controller.validate import Array, array, fail, number, one_of, positive_definite, unit_quaternions
 
 EDGES = 16  # of the polygon in which a QP keeps a planar force: up to 1 - cos(pi / 16) = 2 % of a bound is unused
@@ -114,17 +114,16 @@ class Horizon:
         """Pose 0 alone, in table axes, and how it is reached; see `Path`."""
         where, at = array("position", state.position, (3,)), unit_quaternions("orientation", state.orientation, (4,))
         velocity, omega = (array(name, getattr(state, name), (3,)) for name in ("velocity", "angular_velocity"))
-        position = self.table.T @ where
-        orientation = quaternion_product(self._to_table, at)
-        self._refuse_off_plane("orientation", orientation)
-        rates = np.concatenate([self.table.T @ velocity, rotated(at * CONJUGATE, omega)])
-        kept = self.controller.belief.wrench_map
-        arriving = self.h * (kept.T @ (kept @ rates))
-        before = np.concatenate([position, orientation])
-        if INTEGRATORS[self.integrator][1] == 2:
-            position = position + arriving[:3]
-            orientation = turned(orientation, arriving[3:])
-        return Path(position[None], orientation[None], before, arriving)
+        ahead = INTEGRATORS[self.integrator][1] == 2
+        path = Path(np.empty((1, 3)), np.empty((1, 4)), np.empty(7), np.empty(6))
+        fill_start(self.table, self._to_table, self._kept, self.h, ahead, where, at, velocity, omega, path)
+        self._refuse_off_plane("orientation", path.before[3:])
+        return path
+
+    @cached_property
+    def _kept(self) -> Array:
+        """(6,) 1 for the directions, translations and rotations, in which the object can move; else 0."""
+        return np.abs(self.controller.belief.wrench_map).sum(axis=0)
 
     @cached_property
     def _to_table(self) -> Array:

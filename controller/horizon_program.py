@@ -11,10 +11,10 @@ from pivoting.controller.block_matrix import BlockMatrix, Indices, Part
 from pivoting.controller.conic_program import Cones, ConicProgram
 from pivoting.controller.contact_set import fixed_pairs
 from pivoting.controller.horizon import Horizon
-from pivoting.controller.horizon_rows import fill_clearance, fill_sticking, fill_tracking
+from pivoting.controller.horizon_rows import Rows, defects, fill_corrected, fill_rows, fill_sides, fill_tracking
 from pivoting.controller.limits import friction_limits, wrench_limits
-from pivoting.controller.so3 import exponential, turned
-from pivoting.controller.transcription import INTEGRATORS, Mechanics, Motion, Path, fill_motion, motion_rows
+from pivoting.controller.so3 import exponential
+from pivoting.controller.transcription import INTEGRATORS, Mechanics, Path
 from pivoting.controller.validate import Array
 
 
@@ -24,19 +24,6 @@ class Guess(NamedTuple):
     path: Path
     wrench: Array
     force: Array
-
-
-class _Rows(NamedTuple):
-    """What depends on a guess.
-
-    sticking: (N, S, nq), off: (N, S).  clearance: (N, P, nq), room: (N, P); see `horizon_rows`.
-    """
-
-    motion: Motion
-    sticking: Array
-    off: Array
-    clearance: Array
-    room: Array
 
 
 class HorizonProgram:
@@ -68,7 +55,8 @@ class HorizonProgram:
         linear = [len(own.linear), len(bound.linear), len(self._clear)]
         cones = [len(own.cone), len(bound.cone)]
         tall = nq + self._sticking, sum(linear), sum(cones)
-        self._bounds, self._tall, self._before = bound, tall, (linear[0], cones[0])  # rows before those of the bounds
+        self._bounds, self._tall = bound, tall[:2]
+        self._first = N * tall[0] + linear[0], N * sum(tall[:2]) + cones[0]  # rows of the first step's bounds
         self.cones = Cones(N * tall[0], N * tall[1], N * (own.orders + bound.orders))
         self._wide = 2 * nq + n
         pose, wrench, push = (np.arange(a, b) for a, b in ((0, nq), (nq, 2 * nq), (2 * nq, self._wide)))
@@ -122,75 +110,49 @@ class HorizonProgram:
         rows = self._rows(guess)
         motion, before = rows.motion, None if applied is None else applied / self._units.wrench
         A = self._A.filled(
-            [*(motion.towards[lag, lag:] for lag in range(3)), motion.by_wrench, motion.by_force, rows.sticking,
-             rows.clearance]
+            (motion.towards[0], motion.towards[1, 1:], motion.towards[2, 2:], motion.by_wrench, motion.by_force,
+             rows.sticking, rows.clearance)
         )  # fmt: skip
         b = self._sides.copy()
-        groups = np.split(b, np.cumsum([N * tall for tall in self._tall[:2]]))
-        equal, linear, cone = (group.reshape(N, -1) for group in groups)
-        np.negative(motion.constant, out=equal[:, :nq])
-        equal[:, nq:], linear[:, linear.shape[1] - len(self._clear) :] = rows.off, rows.room
-        for group, first, sides in zip((linear, cone), self._before, self._bounds.first(before), strict=True):
-            group[0, first : first + len(sides)] = sides
-        curvature, slope, _ = self._tracking(guess.path, desired)
-        q = np.zeros((N, self._wide))
-        q[:, :nq] = slope
-        return ConicProgram(self._P.filled([curvature]), q.ravel(), A, b, self.cones)
+        fill_sides(rows, *self._tall, b)
+        if self._bounds.rated:
+            for first, sides in zip(self._first, self._bounds.first(before), strict=True):
+                b[first : first + len(sides)] = sides
+        curvature, q = np.empty((N, nq, nq)), np.zeros((N, self._wide))
+        fill_tracking(self._body, self._Q, guess.path, *desired, curvature, q)
+        return ConicProgram(self._P.filled((curvature,)), q.ravel(), A, b, self.cones)
 
     def corrected(self, guess: Guess, x: Array) -> tuple[Guess, float]:
         """The guess with an answer's corrections and its wrenches and forces, and the greatest change of any of them.
 
         The change is in units of the weight and the lever, and of radians.
         """
-        nq, units = len(self._units.pose), self._units
-        steps = x.reshape(self.horizon.steps, self._wide)
-        moved = (steps[:, :nq] * units.pose) @ self._belief.wrench_map
-        position, orientation = guess.path.position.copy(), guess.path.orientation.copy()
-        position[1:] += moved[:, :3]
-        orientation[1:] = turned(orientation[1:], moved[:, 3:])
-        change = steps.copy()
-        change[:, nq : 2 * nq] -= guess.wrench / units.wrench
-        change[:, 2 * nq :] -= guess.force / units.force
-        path = guess.path._replace(position=position, orientation=orientation)
-        wrench, force = steps[:, nq : 2 * nq] * units.wrench, steps[:, 2 * nq :] * units.force
-        return Guess(path, wrench, force), float(np.abs(change).max())
+        N, path = self.horizon.steps, guess.path
+        poses = path._replace(position=np.empty(path.position.shape), orientation=np.empty(path.orientation.shape))
+        out = Guess(poses, np.empty(guess.wrench.shape), np.empty(guess.force.shape))
+        return out, fill_corrected(self._body, x.reshape(N, self._wide), guess, out)
 
     def defects(self, guess: Guess) -> tuple[float, float]:
         """How far a guess is from its own equations, not linearised: motion in weights, sticking in levers, radians."""
-        rows = self._rows(guess)
-        wrench, force = guess.wrench / self._units.wrench, guess.force / self._units.force
-        left = rows.motion.by_wrench @ wrench[..., None] + rows.motion.by_force @ force[..., None]
-        left = left[..., 0] + rows.motion.constant
-        return float(np.abs(left).max()), float(np.abs(rows.off).max(initial=0.0))
+        return defects(self._rows(guess), self._units, guess.wrench, guess.force)
 
     def objective(self, desired: tuple[Array, Array], guess: Guess) -> float:
         """sum 1/2 w'Q_w w + 1/2 f'Q_f f + 1/2 e'Q e, in SI units, poses taken as they are."""
         applied = np.vdot(guess.wrench @ self._belief.Q_w, guess.wrench)
         pushed = np.vdot(guess.force @ self._belief.Q_f, guess.force)
-        tracking = self._tracking(guess.path, desired)[2]
+        room = np.empty((self.horizon.steps, *2 * (len(self._units.pose),)))
+        tracking = fill_tracking(self._body, self._Q, guess.path, *desired, room, room[:, 0])
         return float(0.5 * (applied + pushed) + tracking * self._units.force**2)
 
-    def _rows(self, guess: Guess) -> _Rows:
-        horizon, body, path, N, nq = self.horizon, self._body, guess.path, self.horizon.steps, len(self._units.pose)
-        motion = motion_rows(N, nq, guess.force.shape[1])
+    def _rows(self, guess: Guess) -> Rows:
+        horizon, planar = self.horizon, self.horizon.controller.space.dim == 2
+        nq, n = guess.wrench.shape[1], guess.force.shape[1]
+        rows = Rows.empty(horizon.steps, nq, n, self._sticking, len(self._clear))
         order, lag = INTEGRATORS[horizon.integrator]
-        fill_motion(body, order, lag, horizon.h, path, guess.wrench, guess.force, motion)
-        S, P = self._sticking, len(self._clear)
-        rows = _Rows(motion, np.empty((N, S, nq)), np.empty((N, S)), np.empty((N, P, nq)), np.empty((N, P)))
-        if S:
-            fill_sticking(body, self._fixed, horizon.controller.space.dim == 2, path, rows.sticking, rows.off)
-        if P:
-            fill_clearance(body, self._clear, path, rows.clearance, rows.room)
+        fill_rows(self._body, order, lag, horizon.h, self._fixed, planar, self._clear, *guess, rows)
         return rows
 
-    def _tracking(self, path: Path, desired: tuple[Array, Array]) -> tuple[Array, Array, float]:
-        """Curvature (N, nq, nq), slope (N, nq) and value of the cost of tracking."""
-        N, nq = self.horizon.steps, len(self._units.pose)
-        curvature, slope = np.empty((N, nq, nq)), np.empty((N, nq))
-        cost = fill_tracking(self._body, self._Q, path, *desired, curvature, slope)
-        return curvature, slope, cost
-
-    def _generic(self) -> tuple[_Rows, Array]:
+    def _generic(self) -> tuple[Rows, Array]:
         """Rows and curvature about a path without any symmetry, which show what may be other than zero."""
         rng, N, W = np.random.default_rng(0), self.horizon.steps, self._belief.wrench_map
         vectors = rng.normal(size=(2 * N + 3, len(W))) @ W
@@ -198,7 +160,9 @@ class HorizonProgram:
         path = Path(vectors[: N + 1, :3], turns[: N + 1], np.concatenate([vectors[-1, :3], turns[-1]]), vectors[-2])
         guess = Guess(path, rng.normal(size=(N, len(W))), rng.normal(size=(N, len(self._belief.Q_f))))
         wanted = np.ascontiguousarray(vectors[N + 1 : 2 * N + 1, :3]), turns[N + 1 : 2 * N + 1]
-        return self._rows(guess), self._tracking(path, wanted)[0]
+        curvature = np.empty((N, len(W), len(W)))
+        fill_tracking(self._body, self._Q, path, *wanted, curvature, np.empty((N, len(W))))
+        return self._rows(guess), curvature
 
 
 def _pattern(blocks: Array) -> Array:

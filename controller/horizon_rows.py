@@ -1,9 +1,100 @@
-"""Rows and costs of a horizon that depend on its poses: contacts that stay put, points that stay above, tracking."""
+"""What of a horizon's program depends on a guess: its rows, the cost of tracking, and how far the guess is off."""
+
+from typing import NamedTuple, Self
 
 import numpy as np
 from pivoting.controller.kernel import kernel
-from pivoting.controller.so3 import fill_difference_jacobians
+from pivoting.controller.so3 import fill_difference_jacobians, turn
 from pivoting.controller.space import cross, fill_rotation, into, rotation_error
+from pivoting.controller.transcription import Motion, fill_motion
+from pivoting.controller.validate import Array
+
+
+class Rows(NamedTuple):
+    """Of N steps; see `fill_motion`, `fill_sticking` and `fill_clearance`.
+
+    sticking: (N, S, nq), off: (N, S).  clearance: (N, P, nq), room: (N, P).
+    """
+
+    motion: Motion
+    sticking: Array
+    off: Array
+    clearance: Array
+    room: Array
+
+    @classmethod
+    def empty(cls, N: int, nq: int, n: int, S: int, P: int) -> Self:
+        """Room for them."""
+        motion = Motion(np.empty((N, nq)), np.empty((3, N, nq, nq)), np.empty((N, nq, nq)), np.empty((N, nq, n)))
+        return cls(motion, np.empty((N, S, nq)), np.empty((N, S)), np.empty((N, P, nq)), np.empty((N, P)))
+
+
+@kernel
+def fill_rows(body, order, lag, h, fixed, planar, clear, path, wrench, force, rows):  # type: ignore[no-untyped-def]
+    """Write all of them about a path, wrenches (N, nw) and forces (N, K d) [N, N m]; those without a row are left."""
+    fill_motion(body, order, lag, h, path, wrench, force, rows.motion)
+    if rows.off.shape[1]:
+        fill_sticking(body, fixed, planar, path, rows.sticking, rows.off)
+    if rows.room.shape[1]:
+        fill_clearance(body, clear, path, rows.clearance, rows.room)
+
+
+@kernel
+def fill_sides(rows, equal, linear, out):  # type: ignore[no-untyped-def]
+    """Write the right-hand sides of rows that depend on a guess among those of a program.
+
+    Args:
+        equal, linear: how many equalities and half-lines a step has: motion, sticking; others, clearance.
+        out: of all equalities, then of all half-lines, then others.
+    """
+    N, nq = rows.motion.constant.shape
+    for t in range(N):
+        for r in range(nq):
+            out[equal * t + r] = -rows.motion.constant[t, r]
+        for r in range(rows.off.shape[1]):
+            out[equal * t + nq + r] = rows.off[t, r]
+        first = equal * N + linear * (t + 1) - rows.room.shape[1]
+        for r in range(rows.room.shape[1]):
+            out[first + r] = rows.room[t, r]
+
+
+@kernel
+def defects(rows, units, wrench, force):  # type: ignore[no-untyped-def]
+    """How far wrenches (N, nw) and forces (N, K d) are from the motion, in units, and a path from sticking."""
+    moved, off = 0.0, 0.0
+    motion = rows.motion
+    for t in range(wrench.shape[0]):
+        for r in range(wrench.shape[1]):
+            left = motion.constant[t, r]
+            for c in range(wrench.shape[1]):
+                left += motion.by_wrench[t, r, c] * wrench[t, c] / units.wrench[c]
+            for c in range(force.shape[1]):
+                left += motion.by_force[t, r, c] * force[t, c] / units.force
+            moved = max(moved, abs(left))
+        for r in range(rows.off.shape[1]):
+            off = max(off, abs(rows.off[t, r]))
+    return moved, off
+
+
+@kernel
+def fill_corrected(body, x, guess, out):  # type: ignore[no-untyped-def]
+    """Write the guess that an answer x (N, 2 nq + K d) makes of a guess, and return the greatest change, in units."""
+    nq, n, units, change = guess.wrench.shape[1], guess.force.shape[1], body.units, 0.0
+    moved = np.empty(6)
+    out.path.position[0], out.path.orientation[0] = guess.path.position[0], guess.path.orientation[0]
+    for t in range(x.shape[0]):
+        moved[:] = 0.0
+        for c in range(nq):
+            moved[body.pick[c]] = body.sign[c] * x[t, c] * units.pose[c]
+            out.wrench[t, c] = x[t, nq + c] * units.wrench[c]
+            change = max(change, abs(x[t, c]), abs(x[t, nq + c] - guess.wrench[t, c] / units.wrench[c]))
+        for c in range(n):
+            out.force[t, c] = x[t, 2 * nq + c] * units.force
+            change = max(change, abs(x[t, 2 * nq + c] - guess.force[t, c] / units.force))
+        for i in range(3):
+            out.path.position[t + 1, i] = guess.path.position[t + 1, i] + moved[i]
+        turn(guess.path.orientation[t + 1], moved[3:], out.path.orientation[t + 1])
+    return change
 
 
 @kernel
@@ -85,7 +176,7 @@ def fill_tracking(body, Q, path, position, orientation, curvature, slope):  # ty
     Args:
         body: `Mechanics`.  Q: (N, nq, nq), over the square of the unit of force.
         position: (N, 3), orientation: (N, 4): desired, table axes.
-        curvature: (N, nq, nq) and slope: (N, nq), out.
+        curvature: (N, nq, nq) and slope: (N, nq or more), out.
 
     Returns:
         The sum of 1/2 e'Q e, over that square.

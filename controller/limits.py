@@ -26,6 +26,11 @@ class Limits(NamedTuple):
     cone_rate: Flags
     orders: tuple[int, ...]
 
+    @property
+    def rated(self) -> bool:
+        """Whether any bound is on the change."""
+        return bool(self.linear_rate.any() or self.cone_rate.any())
+
     def first(self, before: Array | None) -> tuple[Array, Array]:
         """Right-hand sides of the first step, whose rates count from the wrench `before` it; None: unknown."""
         out = []

@@ -24,7 +24,8 @@ class Plan:
     """An answer to a horizon's program, with how well it satisfies its own equations.
 
     Attributes:
-        horizon: what was planned.  guess: the answer, poses in table axes, as the next program can be stated about it.
+        program: of the horizon.  desired: poses (N, 3) and (N, 4), table axes.
+        guess: the answer, poses in table axes, as the next program can be stated about it.
         status: "solved", "not converged" (the last pass still changed more than asked), "infeasible" or "failed".
         said: by the solver.
         passes: how many programs were solved.
@@ -32,11 +33,11 @@ class Plan:
         residual: relative KKT residual of the last program.
         motion_defect: of the equations of motion themselves, not linearised, over the weight.
         stick_defect: of the contacts staying put, over the lever; 0 if that was not asked.
-        objective: of the answer.
         seconds: in all.  solver_seconds: inside the solver.
     """
 
-    horizon: Horizon = field(repr=False)
+    program: HorizonProgram = field(repr=False)
+    desired: tuple[Array, Array] = field(repr=False)
     guess: Guess = field(repr=False)
     status: str
     said: str
@@ -45,9 +46,18 @@ class Plan:
     residual: float
     motion_defect: float
     stick_defect: float
-    objective: float
     seconds: float
     solver_seconds: float
+
+    @property
+    def horizon(self) -> Horizon:
+        """What was planned."""
+        return self.program.horizon
+
+    @cached_property
+    def objective(self) -> float:
+        """Of the answer, in SI units."""
+        return self.program.objective(self.desired, self.guess)
 
     @cached_property
     def position(self) -> Array:
@@ -202,7 +212,8 @@ class Planner:
         for values in (found.guess.wrench, found.guess.force):
             values.flags.writeable = False
         return Plan(
-            self.horizon,
+            self.program,
+            wanted,
             found.guess,
             status=found.status,
             said=found.said,
@@ -211,7 +222,6 @@ class Planner:
             residual=found.residual,
             motion_defect=motion,
             stick_defect=stick,
-            objective=self.program.objective(wanted, found.guess),
             seconds=perf_counter() - began,
             solver_seconds=inside,
         )

@@ -5,9 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 from pivoting.controller.horizon import BodyState
+from pivoting.controller.kernel import kernel
 from pivoting.controller.plan import Plan, Planner
-from pivoting.controller.so3 import exponential
-from pivoting.controller.space import quaternion_product
+from pivoting.controller.so3 import turn
+from pivoting.controller.space import fill_rotation, into, quaternion_product
 from pivoting.controller.transcription import INTEGRATORS
 from pivoting.controller.validate import Array, fail
 
@@ -101,20 +102,29 @@ def followed_motion(followed: Followed, state: BodyState, times: Array) -> tuple
     if plan is None:
         still = np.zeros((len(times), 3))
         return np.tile(state.orientation, (len(times), 1)), still, still.copy()
-    h, N = plan.horizon.h, plan.horizon.steps
-    at = np.clip(followed.since + times, 0.0, N * h)
-    index = np.minimum((at / h + 1e-9).astype(int), N - 1)
-    last = index.max() + 1
-    rates = plan.angular_velocity[: last + 1]
-    if INTEGRATORS[plan.horizon.integrator][0] == 1:
-        rates, growth = rates[1:], np.zeros((last, 3))
-    else:
-        growth = np.diff(rates, axis=0) / h
-    nodes = np.empty((last, 4))
-    nodes[0] = quaternion_product(plan.horizon.controller.base, plan.guess.path.before[3:])
-    for t in range(last - 1):  # world axes, each about an axis that hardly turns within a step
-        nodes[t + 1] = quaternion_product(exponential((rates[t] + 0.5 * growth[t] * h) * h), nodes[t])
-    tau = (at - index * h)[:, None]
-    grown = growth[index]
-    orientation = quaternion_product(exponential((rates[index] + 0.5 * grown * tau) * tau), nodes[index])
-    return orientation, rates[index] + grown * tau, grown
+    begun = quaternion_product(plan.horizon.controller.base, plan.guess.path.before[3:])
+    accelerated = INTEGRATORS[plan.horizon.integrator][0] == 2
+    out = np.empty((len(times), 4)), np.empty((len(times), 3)), np.empty((len(times), 3))
+    _follow(begun, plan.angular_velocity, accelerated, plan.horizon.h, followed.since + times, *out)
+    return out
+
+
+@kernel
+def _follow(begun, rates, accelerated, h, times, orientation, rate, acceleration):  # type: ignore[no-untyped-def]
+    """Write the motion (T, 4), (T, 3), (T, 3) from `begun` (4,), with rates (N + 1, 3) in world axes every h [s]."""
+    N, R = rates.shape[0] - 1, np.empty((3, 3))
+    turning = np.empty(3)
+    for i in range(times.shape[0]):
+        at = min(max(times[i], 0.0), N * h)
+        last = min(int(at / h + 1e-9), N - 1)
+        orientation[i] = begun
+        for step in range(last + 1):
+            tau = h if step < last else at - last * h
+            begin = rates[step] if accelerated else rates[step + 1]
+            fill_rotation(orientation[i], R)
+            for j in range(3):
+                growth = (rates[step + 1, j] - begin[j]) / h
+                rate[i, j], acceleration[i, j] = begin[j] + growth * tau, growth
+                turning[j] = (begin[j] + 0.5 * growth * tau) * tau  # about an axis that hardly turns within a step
+            turning[0], turning[1], turning[2] = into(R, turning[0], turning[1], turning[2])
+            turn(orientation[i], turning, orientation[i])

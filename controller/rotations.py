@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pivoting.controller.references import MinimumJerk, Reference
 from pivoting.controller.so3 import exponential
 from pivoting.controller.space import Motion, quaternion_product, rotation_error, rotation_matrix
-from pivoting.controller.validate import Array, array, fail, number
+from pivoting.controller.validate import Array, array, fail, number, unit_quaternions
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +122,5 @@ class SampledRotation:
 
 def unit_quaternion(name: str, value: ArrayLike) -> Array:
     """(4,) of unit length to the last bit; raises unless it was nearly so."""
-    given = array(name, value, (4,))
-    length = float(np.linalg.norm(given))
-    if abs(length - 1.0) > 1e-6:
-        raise fail(name, given, "unit quaternions (w, x, y, z)")
-    return given / length
+    given = unit_quaternions(name, value, (4,))
+    return given / np.linalg.norm(given)

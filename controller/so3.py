@@ -2,24 +2,28 @@
 
 import numpy as np
 from pivoting.controller.kernel import elementwise, kernel
-from pivoting.controller.space import IDENTITY, rotation_error
+from pivoting.controller.space import IDENTITY, fill_product, rotation_error
 from pivoting.controller.validate import Array
 
 _SMALL = 1e-4  # [rad]: below, the series is more accurate than the quotient
 
 
+@kernel
+def turn(orientation, vector, out):  # type: ignore[no-untyped-def]
+    """Write the unit quaternion (4,) turned by a rotation vector (3,) [rad] in the object's own axes."""
+    angle = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    scale = 0.5 if angle < 1e-9 else np.sin(0.5 * angle) / angle
+    by = np.array([np.cos(0.5 * angle), scale * vector[0], scale * vector[1], scale * vector[2]])
+    fill_product(orientation, by, out)
+    length = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2)
+    for i in range(4):
+        out[i] /= length
+
+
 @elementwise(2, "(q),(v)->(q)")
 def turned(orientation, vector, out):  # type: ignore[no-untyped-def]
     """(..., 4) unit quaternions turned by rotation vectors (..., 3) [rad] in the object's own axes."""
-    x, y, z = vector[0], vector[1], vector[2]
-    angle = np.sqrt(x * x + y * y + z * z)
-    scale = 0.5 if angle < 1e-9 else np.sin(0.5 * angle) / angle
-    x, y, z, w = scale * x, scale * y, scale * z, np.cos(0.5 * angle)
-    a, b, c, d = orientation[0], orientation[1], orientation[2], orientation[3]
-    q0, q1 = a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y
-    q2, q3 = a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w
-    length = np.sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
-    out[0], out[1], out[2], out[3] = q0 / length, q1 / length, q2 / length, q3 / length
+    turn(orientation, vector, out)
 
 
 @elementwise(2, "(q),(v)->(v)")

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 from pivoting.controller.kernel import elementwise, inlined, kernel
-from pivoting.controller.validate import Array, array, fail
+from pivoting.controller.validate import Array, array, fail, unit_quaternions
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])  # a unit quaternion's inverse, component by component
@@ -96,19 +96,14 @@ class Space:
                     raise fail(name, value, "a finite number in the plane")
                 values.append(float(value))  # type: ignore[arg-type]
             return self.orientation(values[0]), self.axial(values[1]), self.axial(values[2])
-        quaternion = array("orientation", motion.orientation, (4,))
-        if abs(np.linalg.norm(quaternion) - 1.0) > 1e-6:
-            raise fail("orientation", quaternion, "a unit quaternion (w, x, y, z)")
+        quaternion = unit_quaternions("orientation", motion.orientation, (4,))
         rates = [np.broadcast_to(np.asarray(rate, dtype=float), (3,)) for rate in motion[1:]]
         return quaternion, array("velocity", rates[0], (3,)), array("acceleration", rates[1], (3,))
 
 
 def space(dim: int, base: ArrayLike = IDENTITY) -> Space:
     """The plane (`dim` 2, on a table of frame `base`) or space (`dim` 3)."""
-    frame = array("base", base, (4,))
-    if abs(np.linalg.norm(frame) - 1.0) > 1e-6:
-        raise fail("base", frame, "a unit quaternion (w, x, y, z)")
-    return Space(dim, frame)
+    return Space(dim, unit_quaternions("base", base, (4,)))
 
 
 def tilt(angle: float) -> Array:
@@ -116,13 +111,20 @@ def tilt(angle: float) -> Array:
     return np.array([np.cos(0.5 * angle), 0.0, -np.sin(0.5 * angle), 0.0])
 
 
+@inlined
+def fill_product(p, q, out):  # type: ignore[no-untyped-def]
+    """Write the Hamilton product of quaternions (4,) (w, x, y, z) into out, which may be one of them."""
+    w = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3]
+    x = p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2]
+    y = p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1]
+    z = p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0]
+    out[0], out[1], out[2], out[3] = w, x, y, z
+
+
 @elementwise(2, "(q),(q)->(q)")
 def quaternion_product(p, q, out):  # type: ignore[no-untyped-def]
-    """Hamilton product of (..., 4) quaternions (w, x, y, z)."""
-    out[0] = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3]
-    out[1] = p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2]
-    out[2] = p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1]
-    out[3] = p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0]
+    """Hamilton product of (..., 4) quaternions (w, x, y, z), shapes broadcast."""
+    fill_product(p, q, out)
 
 
 @inlined

@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from pivoting.controller.block_matrix import Indices
 from pivoting.controller.kernel import kernel
-from pivoting.controller.so3 import add_product, fill_difference_jacobians, fill_hat
-from pivoting.controller.space import cross, fill_rotation, into, rotation_error
+from pivoting.controller.so3 import add_product, fill_difference_jacobians, fill_hat, turn
+from pivoting.controller.space import cross, fill_product, fill_rotation, into, rotation_error
 from pivoting.controller.units import Units
 from pivoting.controller.validate import Array
 
@@ -70,9 +70,26 @@ class Motion(NamedTuple):
     by_force: Array
 
 
-def motion_rows(N: int, nq: int, n: int) -> Motion:
-    """Room for the equations of motion of N steps."""
-    return Motion(np.zeros((N, nq)), np.zeros((3, N, nq, nq)), np.zeros((N, nq, nq)), np.zeros((N, nq, n)))
+@kernel
+def fill_start(table, to_table, kept, h, ahead, position, orientation, velocity, omega, out):  # type: ignore[no-untyped-def]
+    """Write pose 0 of a `Path`, from a state in world axes; `ahead`: one step after it, see `INTEGRATORS`.
+
+    Args:
+        table: (3, 3) its axes as columns; to_table: (4,) its inverse.  kept: (6,) 0 for what cannot move, else 1.
+    """
+    R = np.empty((3, 3))
+    fill_rotation(orientation, R)
+    before, arriving = out.before, out.arriving
+    before[0], before[1], before[2] = into(table, position[0], position[1], position[2])
+    fill_product(to_table, orientation, before[3:])
+    arriving[0], arriving[1], arriving[2] = into(table, velocity[0], velocity[1], velocity[2])
+    arriving[3], arriving[4], arriving[5] = into(R, omega[0], omega[1], omega[2])
+    for i in range(6):
+        arriving[i] *= h * kept[i]
+    out.position[0], out.orientation[0] = before[:3], before[3:]
+    if ahead:
+        out.position[0] += arriving[:3]
+        turn(before[3:], arriving[3:], out.orientation[0])
 
 
 @kernel

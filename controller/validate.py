@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pivoting.controller.kernel import kernel
 
 Array = NDArray[np.float64]
 
@@ -18,28 +19,42 @@ def fail(name: str, value: object, allowed: str) -> InputError:
 
 def array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
     """A read-only float copy of `value`, finite and of `shape` (None: any length)."""
-    wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
     try:
         given = np.asarray(value)
     except ValueError:  # ragged
-        raise fail(name, value, f"an array of numbers of shape {wanted}") from None
+        raise fail(name, value, f"an array of numbers of shape {_shown(shape)}") from None
     if given.dtype.kind not in "iuf":  # not bool, text, complex, object
-        raise fail(name, value, f"an array of real numbers of shape {wanted}")
+        raise fail(name, value, f"an array of real numbers of shape {_shown(shape)}")
     out = np.array(given, dtype=float)
-    if out.ndim != len(shape) or any(n not in (None, m) for n, m in zip(shape, out.shape, strict=True)):
-        raise fail(name, value, f"of shape {wanted}, not {out.shape}")
+    if out.shape != shape and (
+        out.ndim != len(shape) or any(n not in (None, m) for n, m in zip(shape, out.shape, strict=True))
+    ):
+        raise fail(name, value, f"of shape {_shown(shape)}, not {out.shape}")
     if not np.isfinite(out).all():
         raise fail(name, value, "finite")
     out.flags.writeable = False
     return out
 
 
+def _shown(shape: tuple[int | None, ...]) -> str:
+    return "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
+
+
 def unit_quaternions(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
     """The same for quaternions of unit length, the last axis of `shape`, to 1e-6."""
     out = array(name, value, shape)
-    if (np.abs(np.sqrt((out * out).sum(axis=-1)) - 1.0) > 1e-6).any():
+    if _off_unit(out.reshape(-1, 4)) > 1e-6:
         raise fail(name, out, "a unit quaternion (w, x, y, z)" + (" in each row" if out.ndim > 1 else ""))
     return out
+
+
+@kernel
+def _off_unit(q):  # type: ignore[no-untyped-def]
+    worst = 0.0
+    for i in range(q.shape[0]):
+        length = np.sqrt(q[i, 0] ** 2 + q[i, 1] ** 2 + q[i, 2] ** 2 + q[i, 3] ** 2)
+        worst = max(worst, abs(length - 1.0))
+    return worst
 
 
 def number(
@@ -53,16 +68,12 @@ def number(
     unit: str = "",
 ) -> float:
     """A finite float inside the given open (`above`, `below`) and closed (`at_least`, `at_most`) bounds."""
-    bounds = [
-        f"{word} {bound:g}"
-        for word, bound in ((">", above), ("<", below), (">=", at_least), ("<=", at_most))
-        if np.isfinite(bound)
-    ]
-    allowed = "a finite number" + (f" {' and '.join(bounds)}" if bounds else "") + (f" [{unit}]" if unit else "")
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        raise fail(name, value, allowed)
-    if not (np.isfinite(value) and above < value < below and at_least <= value <= at_most):
-        raise fail(name, float(value), allowed)
+    real = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    if not (real and np.isfinite(value) and above < value < below and at_least <= value <= at_most):
+        limits = ((">", above), ("<", below), (">=", at_least), ("<=", at_most))
+        bounds = " and ".join(f"{word} {bound:g}" for word, bound in limits if np.isfinite(bound))
+        allowed = "a finite number" + (f" {bounds}" if bounds else "") + (f" [{unit}]" if unit else "")
+        raise fail(name, float(value) if real else value, allowed)
     return float(value)
 
 

@@ -79,11 +79,13 @@ class BoundedControl:
     def __init__(self, inner: Control, controller: WrenchController, bounds: WrenchBounds, dt: float):
         self._inner, self._controller, self._dt = inner, controller, dt
         self._bounds = bounds.stacked(len(controller.Q_w))
+        self._rated = bool(self._bounds.rate.any())
         self._solve = BoundedSolver(controller, bounds, dt)
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
         self._inner(k, states, before, out)
-        last, excess = _applied(before), np.empty(len(out.wrench))
+        last = _applied(before) if self._rated else None
+        excess = np.empty(len(out.wrench))
         fill_excess(self._bounds, out.wrench, out.wrench if last is None else last, self._dt, excess)
         for i in np.flatnonzero(excess > OVER):
             required = self._controller.jacobian(states.orientation[i]) @ out.force[i] + out.wrench[i]
@@ -167,9 +169,12 @@ class HorizonControl:
         every: int,
         steps: int,
     ):
-        self._horizons, self._reference, self._dt, self._every = horizons, reference, dt, every
+        self._horizons, self._dt, self._every = horizons, dt, every
         self._belief, self._work = controller.belief, controller.workspace()
         W, P = len(horizons), -(-steps // every)
+        times = every * dt * np.arange(P)[:, None] + horizons[0].planner.horizon.times
+        wanted = np.asarray(reference(times.ravel()).orientation)
+        self._wanted = wanted.reshape(*times.shape, 4)  # (P, N, 4) desired orientations over each plan's horizon
         self._followed: list[Followed | None] = [None] * W
         self._released = np.zeros(W, dtype=bool)
         self._motions = np.empty((every, W, 4)), np.empty((every, W, 3)), np.empty((every, W, 3))
@@ -181,16 +186,16 @@ class HorizonControl:
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
         if k % self._every == 0:
-            wanted, applied = self._wanted(k), _applied(before)
+            applied = _applied(before)
             for i in range(len(out.wrench)):
-                self._plan(i, k, states, wanted, None if applied is None else applied[i])
+                self._plan(i, k, states, None if applied is None else applied[i])
         self._follow(k, states, out)
 
     def prepare(self, states: States, out: Answers) -> None:
         """Compile, and set the first world's solver up."""
         state = BodyState(*(np.array(values[0]) for values in states))
         for _ in range(2):
-            self._horizons[0].replan(state, self._wanted(0), None)
+            self._horizons[0].replan(state, self._wanted[0], None)
         for values, still in zip(self._motions, (state.orientation, np.zeros(3), np.zeros(3)), strict=True):
             values[:] = still
         self._follow(0, states, out)
@@ -203,24 +208,19 @@ class HorizonControl:
             for values in out:
                 values[self._released] = 0
 
-    def _wanted(self, k: int) -> Array:
-        """(N, 4) desired orientations over the horizon that begins at step k."""
-        times = k * self._dt + self._horizons[0].planner.horizon.times
-        return np.asarray(self._reference(times).orientation)
-
-    def _plan(self, i: int, k: int, states: States, wanted: Array, applied: Array | None) -> None:
+    def _plan(self, i: int, k: int, states: States, applied: Array | None) -> None:
         state = BodyState(*(np.array(values[i]) for values in states))
-        if not all(np.isfinite(values).all() for values in state):
+        if not np.isfinite(np.concatenate(state)).all():
             return  # the world has diverged: its law will say so
-        last = self._followed[i]
-        now = self._horizons[i].replan(state, wanted, last, applied)
+        last, p = self._followed[i], k // self._every
+        now = self._horizons[i].replan(state, self._wanted[p], last, applied)
         self._followed[i], self._released[i] = now, now.outcome == "released"
-        self.log.outcome[i, k // self._every] = OUTCOMES.index(now.outcome)
+        self.log.outcome[i, p] = OUTCOMES.index(now.outcome)
         if now is last:  # let go: there was no plan
             return
         for values, motion in zip(self._motions, followed_motion(now, state, self._times), strict=True):
             values[:, i] = motion
-        tried, p = now.attempt, k // self._every
+        tried = now.attempt
         change = tried.changes[-1] if tried.changes else np.nan
         self.log.residual[i, p], self.log.change[i, p], self.log.ms[i, p] = tried.residual, change, 1e3 * tried.seconds
         self.log.motion_defect[i, p], self.log.stick_defect[i, p] = tried.motion_defect, tried.stick_defect
