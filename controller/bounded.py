@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from pivoting.controller.block_matrix import BlockMatrix, Indices, Part
 from pivoting.controller.bounds import WrenchBounds
-from pivoting.controller.conic_program import ClarabelInPlace, Cones, ConicProgram, kkt_residual
+from pivoting.controller.conic_program import ClarabelInPlace, Cones, ConicProgram
 from pivoting.controller.contact_set import free_axes
 from pivoting.controller.controller import WrenchController
 from pivoting.controller.kernel import kernel
@@ -20,7 +20,6 @@ from pivoting.controller.space import component, cross, fill_rotation, into
 from pivoting.controller.validate import Array, number
 
 GIVE_UP, BREAK = 1e2, 1e4  # rho_a and rho_s, in weights: far above any multiplier of an answer that is worth having
-POOR = 1e-8  # relative KKT residual
 EXACT = 1e-6  # of the weight: less than this is nothing given up
 
 
@@ -117,17 +116,11 @@ class BoundedSolver:
         _fill_turning(self._axes, np.array(orientation), self._belief, self._scale, turning)
         program = ConicProgram(self._P, self._q, self._A.filled((scaled[None], turning[None])), b, self._cones)
         answer = self._solve(program)
-        residual = kkt_residual(program, answer)
-        if not residual <= POOR:  # scaled for another problem: begin anew, and keep the better of the two
-            again = ClarabelInPlace()(program)
-            better = kkt_residual(program, again)
-            if better < residual or not np.isfinite(residual):
-                answer, residual = again, better
         force, wrench = answer.x[:n] * self._unit, answer.x[n : n + nw] * self._scale
         lacking = required - jacobian @ force - wrench
         exact = bool(np.abs(lacking / self._scale).max() <= EXACT)
         return BoundedWrench(
-            wrench, force.reshape(len(self._belief.mu), -1), lacking, residual, exact
+            wrench, force.reshape(len(self._belief.mu), -1), lacking, answer.residual, exact
         )  # fmt: skip
 
 

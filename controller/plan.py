@@ -6,7 +6,7 @@ from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
-from pivoting.controller.conic_program import ClarabelInPlace, Solver, kkt_residual, solver
+from pivoting.controller.conic_program import ClarabelInPlace, Solver, solver
 from pivoting.controller.horizon import BodyState, Horizon
 from pivoting.controller.horizon_program import Guess, HorizonProgram
 from pivoting.controller.so3 import fill_differences, rotated
@@ -235,7 +235,7 @@ class Planner:
             program = self.program.stated(wanted, now, applied)
             answer = self._solve(program)
             inside, tried = inside + answer.seconds, tried + 1
-            residual, said = kkt_residual(program, answer), answer.said
+            residual, said = answer.residual, answer.said
             if not residual <= RESIDUAL:
                 if "infeasible" not in said.lower() and self.method != "clarabel":  # few backends prove it
                     said = f"{said}; clarabel: {ClarabelInPlace()(program).said}"
