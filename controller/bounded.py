@@ -63,8 +63,11 @@ class BoundedSolver:
         wide = n + nw + A + nw + 2
         f, w, a, s, t_a, t_s = np.split(np.arange(wide), np.cumsum([n, nw, A, nw, 1]))
         self._cones = Cones(nw, len(own.linear) + len(bound.linear), own.orders + bound.orders + (1 + A, 1 + nw))
-        self._sides = own.linear_side, own.cone_side, np.zeros(2 + A + nw)
+        sides = [np.zeros(nw), own.linear_side, bound.linear_side, own.cone_side, bound.cone_side, np.zeros(2 + A + nw)]
+        self._sides = np.concatenate(sides)
         tops = np.cumsum([0, nw, len(own.linear), len(bound.linear), len(own.cone), len(bound.cone), 1, A, 1, nw])
+
+        self._first = int(tops[2]), int(tops[4])
 
         def part(first: int, columns: Indices, block: Array, changes: bool = False) -> Part:
             rows = tops[first] + np.arange(len(block))
@@ -108,10 +111,12 @@ class BoundedSolver:
         nw, n = len(self._scale), len(self._belief.Q_f)
         jacobian = self._controller.jacobian(orientation)
         scaled = jacobian * self._unit / self._scale[:, None]
-        last = None if before is None else np.asarray(before, dtype=float) / self._scale
-        linear, cone = self._bounds.first(last)
-        own_linear, own_cone, rest = self._sides
-        b = np.concatenate([required / self._scale, own_linear, linear, own_cone, cone, rest])
+        b = self._sides.copy()
+        b[:nw] = required / self._scale
+        if self._bounds.rated:
+            last = None if before is None else np.asarray(before, dtype=float) / self._scale
+            for first, sides in zip(self._first, self._bounds.first(last), strict=True):
+                b[first : first + len(sides)] = sides
         turning = np.empty((nw, len(self._axes)))
         _fill_turning(self._axes, np.array(orientation), self._belief, self._scale, turning)
         program = ConicProgram(self._P, self._q, self._A.filled((scaled[None], turning[None])), b, self._cones)

@@ -112,10 +112,13 @@ class WrenchBounds:
 def fill_excess(stacked, wrench, before, dt, out):  # type: ignore[no-untyped-def]
     """Write by how much each of wrenches (W, nw) exceeds a bound, relative to it, into out (W,); -1 without any bound.
 
+    Returns the greatest of those that are numbers.
+
     Args:
         stacked: of `WrenchBounds.stacked`.
         before: (W, nw) applied `dt` [s] earlier; the wrenches themselves leave rates out.
     """
+    most = -1.0
     for i in range(wrench.shape[0]):
         worst = -1.0
         for k in range(stacked.radius.shape[0]):
@@ -130,3 +133,5 @@ def fill_excess(stacked, wrench, before, dt, out):  # type: ignore[no-untyped-de
             if over > worst or np.isnan(over):
                 worst = over
         out[i] = worst
+        most = max(most, -1.0 if np.isnan(worst) else worst)
+    return most

@@ -15,7 +15,8 @@ UNBOUNDED = 1e3  # of the weight: in place of a bound on the change from a wrenc
 class Limits(NamedTuple):
     """side - rows x in half-lines (`linear`) and in second-order cones of `orders` (`cone`).
 
-    x is a wrench or a set of contact forces; where `rate`, it is what that differs by from the one before.
+    x is a wrench or a set of contact forces; where `rate`, it is what that differs by from the one before. `rated`:
+    whether there is such a row.
     """
 
     linear: Array
@@ -25,11 +26,7 @@ class Limits(NamedTuple):
     cone_side: Array
     cone_rate: Flags
     orders: tuple[int, ...]
-
-    @property
-    def rated(self) -> bool:
-        """Whether any bound is on the change."""
-        return bool(self.linear_rate.any() or self.cone_rate.any())
+    rated: bool
 
     def first(self, before: Array | None) -> tuple[Array, Array]:
         """Right-hand sides of the first step, whose rates count from the wrench `before` it; None: unknown."""
@@ -61,7 +58,7 @@ def friction_limits(mu: Array, floors: Array, dim: int) -> Limits:
     rows = np.reshape(cone, (-1, K * dim))
     still = np.zeros(len(linear), dtype=bool), np.zeros(len(rows), dtype=bool)
     return Limits(
-        np.array(linear), np.array(side), still[0], rows, np.zeros(len(rows)), still[1], (3,) * (len(rows) // 3)
+        np.array(linear), np.array(side), still[0], rows, np.zeros(len(rows)), still[1], (3,) * (len(rows) // 3), False
     )
 
 
@@ -93,4 +90,5 @@ def wrench_limits(bounds: WrenchBounds, nw: int, edges: int, unit: Array, h: flo
     return Limits(
         np.reshape(linear, (-1, nw)), np.array(sides[0]), np.array(rates[0], dtype=bool),
         np.reshape(cone, (-1, nw)), np.array(sides[1]), np.array(rates[1], dtype=bool), tuple(orders),
+        any(rates[0] + rates[1]),
     )  # fmt: skip

@@ -86,7 +86,9 @@ class BoundedControl:
         self._inner(k, states, before, out)
         last = _applied(before) if self._rated else None
         excess = np.empty(len(out.wrench))
-        fill_excess(self._bounds, out.wrench, out.wrench if last is None else last, self._dt, excess)
+        most = fill_excess(self._bounds, out.wrench, out.wrench if last is None else last, self._dt, excess)
+        if not most > OVER:
+            return
         for i in np.flatnonzero(excess > OVER):
             required = self._controller.jacobian(states.orientation[i]) @ out.force[i] + out.wrench[i]
             answer = self._solve(states.orientation[i], required, None if last is None else last[i])
@@ -176,7 +178,7 @@ class HorizonControl:
         wanted = np.asarray(reference(times.ravel()).orientation)
         self._wanted = wanted.reshape(*times.shape, 4)  # (P, N, 4) desired orientations over each plan's horizon
         self._followed: list[Followed | None] = [None] * W
-        self._released = np.zeros(W, dtype=bool)
+        self._released: list[int] = []
         self._motions = np.empty((every, W, 4)), np.empty((every, W, 3)), np.empty((every, W, 3))
         self._times: Array = dt * np.arange(every, dtype=float)
         self.log = PlanLog(
@@ -204,9 +206,9 @@ class HorizonControl:
         """The per-step law; nothing, where the object was let go."""
         now = [values[k % self._every] for values in self._motions]
         step_worlds(self._belief, self._work, TOLERANCE, states.orientation, states.angular_velocity, *now, *out)
-        if self._released.any():
+        for i in self._released:
             for values in out:
-                values[self._released] = 0
+                values[i] = 0
 
     def _plan(self, i: int, k: int, states: States, applied: Array | None) -> None:
         state = BodyState(*(np.array(values[i]) for values in states))
@@ -214,10 +216,12 @@ class HorizonControl:
             return  # the world has diverged: its law will say so
         last, p = self._followed[i], k // self._every
         now = self._horizons[i].replan(state, self._wanted[p], last, applied)
-        self._followed[i], self._released[i] = now, now.outcome == "released"
+        self._followed[i] = now
         self.log.outcome[i, p] = OUTCOMES.index(now.outcome)
         if now is last:  # let go: there was no plan
             return
+        if now.outcome == "released":
+            self._released.append(i)
         for values, motion in zip(self._motions, followed_motion(now, state, self._times), strict=True):
             values[:, i] = motion
         tried = now.attempt
