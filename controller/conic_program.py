@@ -26,7 +26,7 @@ _CLARABEL = {
     **CLARABEL,
     **_TIGHT,
     # every answer is certified, and programs are stated in units of the order of one: half of the time
-    "max_step_fraction": 0.995,  # 8 iterations in place of 11
+    "max_step_fraction": 0.999,  # 8 iterations in place of 11, 14 in place of 20 within bounds
     "equilibrate_max_iter": 1,
     "iterative_refinement_enable": False,
     # what an update in place needs: the pattern that it was set up with
@@ -105,9 +105,9 @@ class Solver(Protocol):
 class ClarabelInPlace:
     """Clarabel set up once, its data replaced as long as the programs have one pattern.
 
-    It is fast because it trusts that pattern's first scaling and its own linear algebra. An answer whose certificate is
-    `POOR` is asked for once more, with a scaling of its own, refined steps and shorter ones; the better of the two
-    counts, and the second is said to be "carefully".
+    It is fast because it trusts that pattern's first scaling and its own linear algebra, and takes long steps. An answer
+    whose certificate is `POOR`, and that there is none, is asked for once more: with a scaling of its own and with
+    refined and shorter steps. The better of the two counts, and the second is said to be "carefully".
     """
 
     def __init__(self, **options: Any):
@@ -123,7 +123,7 @@ class ClarabelInPlace:
             data = {"P": program.P.data, "q": program.q, "A": program.A.data, "b": program.b}
             self._solver.update(**{key: values.tolist() for key, values in data.items()})  # it reads arrays slower
         answer = _read(program, self._solver, "", start)
-        if answer.residual <= POOR or "infeasible" in answer.said.lower():
+        if answer.residual <= POOR:
             return answer
         again = _read(program, self._fresh(program, **_CAREFUL), ", carefully", start)
         return answer if answer.residual <= again.residual else again
