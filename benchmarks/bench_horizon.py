@@ -17,7 +17,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from harness import main
+from harness import main, peer_table, timed
 from pivoting.controller import Body, BodyState, Contact, Horizon, Law, Plan, Planner, WrenchBounds, WrenchController
 from pivoting.controller.validate import Array
 from rich import print as show
@@ -156,19 +156,6 @@ PEERS: dict[int, dict[str, Callable[[Any], Route]]] = {
 }
 
 
-def timed(run: Callable[..., Any], *args: Any) -> tuple[float, Any]:
-    """Least milliseconds, and the answer, None if there is none."""
-    least = np.inf
-    for _ in range(REPEATS):
-        start = perf_counter()
-        try:
-            answer = run(*args)
-        except Exception:  # each solver has its own
-            answer = None
-        least = min(least, perf_counter() - start)
-    return 1e3 * least, answer
-
-
 def family(name: str, count: int) -> dict[str, float]:
     """The figures of all on `count` states."""
     dim = FAMILIES[name][0]
@@ -195,10 +182,10 @@ def family(name: str, count: int) -> dict[str, float]:
                 except ImportError as error:
                     print(f"{name}: {peer} skipped: {error}")
             continue
-        ms, plan = timed(partial(mine.plan, now, wanted, guess=guess, passes=1))
-        spent[OURS].append(ms)
+        seconds, plan = timed(partial(mine.plan, guess=guess, passes=1), (now, wanted), REPEATS)
+        spent[OURS].append(1e3 * seconds)
         spent["its solver"].append(1e3 * plan.solver_seconds)
-        spent["whole plan"].append(timed(mine.plan, now, wanted)[0])
+        spent["whole plan"].append(1e3 * timed(mine.plan, (now, wanted), REPEATS)[0])
         passes.append(whole.passes)
         changes.append(plan.changes[0])
         tied.append(np.mean(np.linalg.norm(plan.wrench[:, :dim], axis=1) >= 0.98 * horizon.bounds.force))
@@ -206,8 +193,8 @@ def family(name: str, count: int) -> dict[str, float]:
         if whole.status != "solved":
             raise RuntimeError(f"{name}: {whole.status}")
         for peer, (prepare, run) in routes.items():
-            ms, x = timed(run, *prepare(program))
-            spent[peer].append(ms)
+            seconds, x = timed(run, prepare(program), REPEATS)
+            spent[peer].append(1e3 * seconds)
             if x is None:
                 errors[peer].append(np.nan)
                 continue
@@ -242,11 +229,7 @@ def markdown(figures: dict[str, float]) -> str:
     """The figures as tables."""
     lines = []
     for name in FAMILIES:
-        lines += ["", f"| {name} | " + " | ".join(COLUMNS) + " |", "|---|" + "--:|" * len(COLUMNS)]
-        for peer in (key[:-4] for key in figures if key.startswith(f"{name}: ") and key.endswith(", ms")):
-            row = ((figures.get(f"{peer}, {column}", np.nan), form) for column, form in COLUMNS.items())
-            cells = ("-" if np.isnan(value) else f"{value:{form}}".rstrip(".") for value, form in row)
-            lines.append(f"| {peer.removeprefix(name + ': ')} | " + " | ".join(cells) + " |")
+        lines += peer_table(figures, name, COLUMNS)
         lines += ["", f"{figures[f'{name}: whole plan, passes']:.0f} passes to a plan (median)"]
     return "\n".join(lines[1:])
 

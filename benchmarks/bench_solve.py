@@ -11,12 +11,11 @@ import warnings
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from time import perf_counter
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from harness import main
+from harness import main, peer_table, timed
 from pivoting.controller import ClarabelWorkspace, WrenchProblem, methods, pyramid_excess, solve
 from pivoting.controller.conic import CLARABEL, ConicForm, conic_form
 from pivoting.controller.dispatch import smallest_wrench, workspace
@@ -98,12 +97,12 @@ def clarabel_in_place(first: Instance, **options: float) -> Route:
     """Nothing but Clarabel's own update and solve, as `ClarabelWorkspace` has set it up."""
     solver = ClarabelWorkspace(first.problem, **options)._solver
 
-    def run(P: Array, A: Array, b: Array) -> Any:
+    def run(P: list[float], A: list[float], b: list[float]) -> Any:
         solver.update(P=P, A=A, b=b)
         answer = solver.solve()
         return answer.x if str(answer.status) == "Solved" else None
 
-    return lambda it: (it.upper.data, it.rows.data, np.r_[it.b, it.d]), run
+    return lambda it: tuple(x.tolist() for x in (it.upper.data, it.rows.data, np.r_[it.b, it.d])), run  # arrays: slower
 
 
 def daqp(first: Instance) -> Route:
@@ -215,19 +214,6 @@ PLANE = {"daqp native": daqp, "quadprog native": quadprog, "casadi qrqp": casadi
 PLANE |= {f'solve(problem, "qp:{name}")': partial(public, f"qp:{name}") for name in BACKENDS}
 
 
-def timed(run: Callable[..., Any], args: tuple[Any, ...], repeats: int = REPEATS) -> tuple[float, Any]:
-    """Least microseconds, and the answer, None if there is none."""
-    least = np.inf
-    for _ in range(repeats):
-        start = perf_counter()
-        try:
-            answer = run(*args)
-        except Exception:  # each solver has its own
-            answer = None
-        least = min(least, perf_counter() - start)
-    return 1e6 * least, answer
-
-
 def family(name: str, count: int) -> dict[str, float]:
     """The figures of all solvers on `count` problems of one family."""
     K, dim = FAMILIES[name]
@@ -238,17 +224,18 @@ def family(name: str, count: int) -> dict[str, float]:
     for peer, route in (COMMON | (PLANE if dim == 2 else {PYRAMID: partial(public, "qp:daqp")})).items():
         try:
             prepare, run = routes[peer] = route(instances[0])
-            timed(run, prepare(instances[0]))  # warm
+            timed(run, prepare(instances[0]), REPEATS)  # warm
         except ImportError as error:
             print(f"{name}: {peer} skipped: {error}")
     spent, errors = ({peer: np.full(count, np.nan) for peer in routes} for _ in range(2))
     loop = []
     for i, it in enumerate(track(instances, name, transient=True)):
         if i % (count // 20) == 0:
-            loop.append(timed(solve_all, (many,), 1)[0] / len(many.mu))
+            loop.append(1e6 * timed(solve_all, (many,), 1)[0] / len(many.mu))
         load = max(np.linalg.norm(it.problem.required[:dim]), it.problem.f_min.max())
         for peer, (prepare, run) in routes.items():
-            spent[peer][i], answer = timed(run, prepare(it))
+            seconds, answer = timed(run, prepare(it), REPEATS)
+            spent[peer][i] = 1e6 * seconds
             if answer is not None and np.isfinite(answer).all():
                 answer = np.ravel(answer)
                 f = answer[: K * dim] * (it.form.unit if answer.size == len(it.P) else 1.0)
@@ -305,7 +292,7 @@ def physics(K: int, count: int) -> dict[str, float]:
                     mujoco.mj_resetData(model, data)
                     mujoco.mj_step(model, data, nstep=20)
                 args = prepare(it)
-                pairs[i] = timed(mujoco.mj_step, (model, data), 1)[0], timed(run, args, 1)[0]
+                pairs[i] = [1e6 * timed(*call, 1)[0] for call in ((mujoco.mj_step, (model, data)), (run, args))]
                 if data.ncon != K:
                     raise RuntimeError(f"the block has {data.ncon} contacts, not {K}")
             out[f"K={K}, {kind}: {peer} / mj_step"] = float(np.median(pairs[:, 1] / pairs[:, 0]))
@@ -317,11 +304,7 @@ def markdown(figures: dict[str, float]) -> str:
     """The figures as the tables of the README."""
     lines = []
     for name in FAMILIES:
-        lines += ["", f"| {name} | " + " | ".join(COLUMNS) + " |", "|---|" + "--:|" * len(COLUMNS)]
-        for peer in (key[:-4] for key in figures if key.startswith(f"{name}: ") and key.endswith(", us")):
-            row = ((figures.get(f"{peer}, {column}", np.nan), form) for column, form in COLUMNS.items())
-            cells = ("-" if np.isnan(value) else f"{value:{form}}".rstrip(".") for value, form in row)
-            lines.append(f"| {peer.removeprefix(name + ': ')} | " + " | ".join(cells) + " |")
+        lines += peer_table(figures, name, COLUMNS)
     lines += ["", "| one solve against one `mj_step` of a block with as many contacts | ratio |", "|---|--:|"]
     lines += [f"| {key[:-10]} | {value:.2f} |" for key, value in figures.items() if key.endswith(" / mj_step")]
     return "\n".join(lines[1:])

@@ -7,7 +7,9 @@ import platform
 from collections.abc import Callable
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
+from math import isnan
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 PACKAGES = ("mujoco", "numpy", "numba", "clarabel", "qpsolvers", "daqp", "quadprog", "piqp")
@@ -31,6 +33,33 @@ def machine() -> dict[str, Any]:
         "python": platform.python_version(),
         "versions": versions,
     }
+
+
+def timed(run: Callable[..., Any], args: tuple[Any, ...], repeats: int) -> tuple[float, Any]:
+    """Least seconds of so many calls, and the last answer, None where there was none."""
+    least = float("inf")
+    for _ in range(repeats):
+        start = perf_counter()
+        try:
+            answer = run(*args)
+        except Exception:  # each solver has its own
+            answer = None
+        least = min(least, perf_counter() - start)
+    return least, answer
+
+
+def peer_table(figures: dict[str, float], name: str, columns: dict[str, str]) -> list[str]:
+    """The lines of a table of one family: its figures are called "name: peer, column", the first column is the time."""
+    time = next(iter(columns))
+    lines = ["", f"| {name} | " + " | ".join(columns) + " |", "|---|" + "--:|" * len(columns)]
+    for key in figures:
+        if not (key.startswith(f"{name}: ") and key.endswith(f", {time}")):
+            continue
+        peer = key.removesuffix(f", {time}")
+        row = ((figures.get(f"{peer}, {column}", float("nan")), form) for column, form in columns.items())
+        cells = ("-" if isnan(value) else f"{value:{form}}".rstrip(".") for value, form in row)
+        lines.append(f"| {peer.removeprefix(name + ': ')} | " + " | ".join(cells) + " |")
+    return lines
 
 
 def main(

@@ -107,7 +107,7 @@ class ClarabelWorkspace:
             raise fail("problem", problem.jacobian.shape, f"of the workspace's shape {self._problem.jacobian.shape}")
         self._problem, self._form = problem, conic_form(problem)
         P, A = (_entries(m, p) for m, p in zip(self._form[:2], self._form.pattern, strict=True))
-        self._solver.update(P=P, A=A, b=self._form.b)
+        self._solver.update(P=P.tolist(), A=A.tolist(), b=self._form.b.tolist())  # it reads arrays slower
 
     def solve(self, *, tolerance: float = TOLERANCE) -> Solution:
         """The certified answer to the problem set last, see `solve`.
@@ -155,6 +155,23 @@ def _sparse(matrix: Array, pattern: Array) -> Any:
 
 
 def _solver(form: ConicForm, options: dict[str, Any]) -> Any:
+    P, A = (_sparse(m, p) for m, p in zip(form[:2], form.pattern, strict=True))
+    orders = (3,) * ((len(form.b) - form.balance - form.linear) // 3)
+    return clarabel_solver(P, np.zeros(form.P.shape[0]), A, form.b, (form.balance, form.linear, orders), options)
+
+
+def clarabel_solver(
+    P: Any, q: Array, A: Any, b: Array, cones: tuple[int, int, tuple[int, ...]], options: dict[str, Any]
+) -> Any:
+    """Clarabel, set up.
+
+    Args:
+        P, A: sparse in compressed columns, of P the upper triangle.
+        cones: numbers of equalities and half-lines, sizes of the second-order cones.
+
+    Raises:
+        ValueError: a setting that Clarabel does not have.
+    """
     import clarabel
 
     settings = clarabel.DefaultSettings()
@@ -163,7 +180,6 @@ def _solver(form: ConicForm, options: dict[str, Any]) -> Any:
         if not hasattr(settings, key):
             raise fail("options", key, "a setting of Clarabel")
         setattr(settings, key, value)
-    P, A = (_sparse(m, p) for m, p in zip(form[:2], form.pattern, strict=True))
-    cones = [clarabel.ZeroConeT(form.balance), clarabel.NonnegativeConeT(form.linear)]
-    cones += [clarabel.SecondOrderConeT(3)] * ((len(form.b) - form.balance - form.linear) // 3)
-    return clarabel.DefaultSolver(P, np.zeros(form.P.shape[0]), A, form.b, cones, settings)
+    zero, linear, orders = cones
+    kinds = [clarabel.ZeroConeT(zero), clarabel.NonnegativeConeT(linear)]
+    return clarabel.DefaultSolver(P, q, A, b, kinds + [clarabel.SecondOrderConeT(order) for order in orders], settings)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from pivoting.controller.block_matrix import Sparse
-from pivoting.controller.conic import CLARABEL
+from pivoting.controller.conic import CLARABEL, clarabel_solver
 from pivoting.controller.kernel import kernel
 from pivoting.controller.validate import Array, fail
 from scipy import sparse
@@ -105,9 +105,9 @@ class Solver(Protocol):
 class ClarabelInPlace:
     """Clarabel set up once, its data replaced as long as the programs have one pattern.
 
-    It is fast because it trusts that pattern's first scaling and its own linear algebra, and takes long steps. An answer
-    whose certificate is `POOR`, and that there is none, is asked for once more: with a scaling of its own and with
-    refined and shorter steps. The better of the two counts, and the second is said to be "carefully".
+    It is fast because it trusts the first program's scaling and its own linear algebra, and takes long steps. Where the
+    certificate is `POOR` or there is no answer, it is asked once more, carefully: with a scaling for this program, with
+    refined and shorter steps. The better of the two counts, and says so.
     """
 
     def __init__(self, **options: Any):
@@ -129,18 +129,8 @@ class ClarabelInPlace:
         return answer if answer.residual <= again.residual else again
 
     def _fresh(self, program: ConicProgram, **careful: Any) -> Any:
-        import clarabel
-
-        settings = clarabel.DefaultSettings()
-        settings.verbose = False
-        for key, value in {**self._options, **careful}.items():
-            if not hasattr(settings, key):
-                raise fail("options", key, "a setting of Clarabel")
-            setattr(settings, key, value)
-        zero, linear, orders = program.cones
-        cones = [clarabel.ZeroConeT(zero), clarabel.NonnegativeConeT(linear)]
-        cones += [clarabel.SecondOrderConeT(order) for order in orders]
-        return clarabel.DefaultSolver(program.P.csc(), program.q, program.A.csc(), program.b, cones, settings)
+        options = {**self._options, **careful}
+        return clarabel_solver(program.P.csc(), program.q, program.A.csc(), program.b, program.cones, options)
 
 
 def _read(program: ConicProgram, solver: Any, how: str, start: float) -> Answer:

@@ -249,6 +249,7 @@ def scenario(name: str) -> Scenario:
     return SCENARIOS[name]
 
 
+_PLANNED = Limits(slip_m=1e-4, angle_rms_deg=0.2, angle_max_deg=0.5, force_mismatch_rel=0.05, settle_s=0.1)
 _SPATIAL = Limits(slip_m=1e-4, angle_rms_deg=0.05, angle_max_deg=0.1, force_mismatch_rel=0.03, settle_s=0.1)
 SCENARIOS = {
     case.name: case
@@ -298,7 +299,7 @@ SCENARIOS = {
             seconds=1.0,
             plan_hz=100.0,
             force_max=8.0,
-            limits=Limits(slip_m=1e-4, angle_rms_deg=0.2, angle_max_deg=0.5, force_mismatch_rel=0.05, settle_s=0.1),
+            limits=_PLANNED,
         ),
         Scenario(
             "balance-3d",
@@ -341,7 +342,7 @@ SCENARIOS = {
             seconds=2.0,
             plan_hz=100.0,
             force_max=8.0,
-            limits=Limits(slip_m=1e-4, angle_rms_deg=0.2, angle_max_deg=0.5, force_mismatch_rel=0.05, settle_s=0.1),
+            limits=_PLANNED,
         ),
         Scenario(
             "settle-3d",
