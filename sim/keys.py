@@ -44,6 +44,7 @@ RANGES: dict[str, dict[str, Any]] = {
 }
 
 
+WHOLE = ("plan_steps",)
 WORDS = ("reference", "law", "integrator")
 KEYS = (*WORDS, *RANGES)
 
@@ -58,7 +59,8 @@ def parsed(key: str, value: Any, prefix: str = "") -> Any:
         return value
     if isinstance(value, str):
         try:
-            return float(value)
+            read = float(value)
         except ValueError:
             raise fail(prefix + key, value, "a number") from None
+        return int(read) if key in WHOLE and read.is_integer() else read
     return value
