@@ -101,7 +101,7 @@ class Scenario:
             one_of("reference", self.reference, ("constant", "arc", "return", "sine"))
         one_of("law", self.law, FORMULATIONS)
         one_of("integrator", self.integrator, tuple(INTEGRATORS))
-        if self.plan_steps != int(self.plan_steps):
+        if not float(self.plan_steps).is_integer():
             raise fail("plan_steps", self.plan_steps, "a whole number")
         if not isinstance(self.limits, Limits):
             raise fail("limits", self.limits, "Limits")
