@@ -98,7 +98,7 @@ class BoundedSolver:
         self._P = BlockMatrix((wide, wide), [Part(every, every, P != 0.0, P)]).filled(())
         self._q = np.zeros(wide)
         self._q[t_a], self._q[t_s] = GIVE_UP, BREAK
-        self._solve = ClarabelInPlace()
+        self._solve = ClarabelInPlace(max_step_fraction=0.999)  # 14 iterations in place of 20
 
     def __call__(self, orientation: Array, required: Array, before: Array | None = None) -> BoundedWrench:
         """The answer to a problem of the controller.
