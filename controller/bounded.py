@@ -98,7 +98,7 @@ class BoundedSolver:
         self._P = BlockMatrix((wide, wide), [Part(every, every, P != 0.0, P)]).filled(())
         self._q = np.zeros(wide)
         self._q[t_a], self._q[t_s] = GIVE_UP, BREAK
-        self._solve = ClarabelInPlace(max_step_fraction=0.999)  # 14 iterations in place of 20
+        self._solve = ClarabelInPlace(step=0.999)  # 14 iterations in place of 20
 
     def __call__(self, orientation: Array, required: Array, before: Array | None = None) -> BoundedWrench:
         """The answer to a problem of the controller.
@@ -113,10 +113,7 @@ class BoundedSolver:
         scaled = jacobian * self._unit / self._scale[:, None]
         b = self._sides.copy()
         b[:nw] = required / self._scale
-        if self._bounds.rated:
-            last = None if before is None else np.asarray(before, dtype=float) / self._scale
-            for first, sides in zip(self._first, self._bounds.first(last), strict=True):
-                b[first : first + len(sides)] = sides
+        self._bounds.place(b, self._first, None if before is None else np.asarray(before, dtype=float) / self._scale)
         turning = np.empty((nw, len(self._axes)))
         _fill_turning(self._axes, np.array(orientation), self._belief, self._scale, turning)
         program = ConicProgram(self._P, self._q, self._A.filled((scaled[None], turning[None])), b, self._cones)

@@ -72,6 +72,11 @@ class WrenchBounds:
         given = [np.min(value) for value in vars(self).values() if value is not None]
         return bool(np.min(given) < np.inf)
 
+    @property
+    def rated(self) -> bool:
+        """Whether a rate is bounded."""
+        return min(self.force_rate, self.moment_rate) < np.inf
+
     def balls(self, nw: int) -> tuple[Ball, ...]:
         """The bounds on a wrench of `nw` = 3 (plane) or 6 components, those that bound something."""
         dim = 2 if nw == 3 else 3
@@ -105,7 +110,7 @@ class WrenchBounds:
         last = np.broadcast_to(wrench if before is None else before, wrench.shape)
         out = np.empty(wrench.size // nw)
         fill_excess(self.stacked(nw), wrench.reshape(-1, nw), last.reshape(-1, nw), dt, out)
-        return float(out.max())
+        return float(out.max(initial=-1.0))
 
 
 @kernel

@@ -16,7 +16,7 @@ from pivoting.controller.kernel import inlined, kernel
 from pivoting.controller.laws import Body, Law, fill_required
 from pivoting.controller.problem import WrenchProblem, wrench_weight
 from pivoting.controller.space import IDENTITY, Motion, Space, fill_rotation, rotation_matrix, space
-from pivoting.controller.units import Units, units
+from pivoting.controller.units import Units, lever, units
 from pivoting.controller.validate import Array, array, fail, number, positive_definite
 
 SOLVED, INACCURATE, FAILED = 0, 1, 2  # codes of `solution.STATUS`
@@ -86,7 +86,7 @@ class WrenchController:
         if not held or len({contact.dim for contact in held}) != 1:
             raise fail("contacts", held, "at least one contact, all planar or all spatial")
         dim, n = held[0].dim, len(held) * held[0].dim
-        reach = float(np.linalg.norm(np.mean([contact.point for contact in held], axis=0)))
+        reach = lever(np.array([contact.point for contact in held]))
         reach += float(np.mean([contact.radius for contact in held]))
         if Q_w is None and reach == 0.0:
             raise fail("contacts", held, "away from the centre of mass, or Q_w given")

@@ -108,16 +108,14 @@ class HorizonProgram:
         """
         N, nq = self.horizon.steps, len(self._units.pose)
         rows = self._rows(guess)
-        motion, before = rows.motion, None if applied is None else applied / self._units.wrench
+        motion = rows.motion
         A = self._A.filled(
             (motion.towards[0], motion.towards[1, 1:], motion.towards[2, 2:], motion.by_wrench, motion.by_force,
              rows.sticking, rows.clearance)
         )  # fmt: skip
         b = self._sides.copy()
         fill_sides(rows, *self._tall, b)
-        if self._bounds.rated:
-            for first, sides in zip(self._first, self._bounds.first(before), strict=True):
-                b[first : first + len(sides)] = sides
+        self._bounds.place(b, self._first, None if applied is None else applied / self._units.wrench)
         curvature, q = np.empty((N, nq, nq)), np.zeros((N, self._wide))
         fill_tracking(self._body, self._Q, guess.path, *desired, curvature, q)
         return ConicProgram(self._P.filled((curvature,)), q.ravel(), A, b, self.cones)
@@ -140,8 +138,8 @@ class HorizonProgram:
         """sum 1/2 w'Q_w w + 1/2 f'Q_f f + 1/2 e'Q e, in SI units, poses taken as they are."""
         applied = np.vdot(guess.wrench @ self._belief.Q_w, guess.wrench)
         pushed = np.vdot(guess.force @ self._belief.Q_f, guess.force)
-        room = np.empty((self.horizon.steps, *2 * (len(self._units.pose),)))
-        tracking = fill_tracking(self._body, self._Q, guess.path, *desired, room, room[:, 0])
+        N, nq = self.horizon.steps, len(self._units.pose)
+        tracking = fill_tracking(self._body, self._Q, guess.path, *desired, np.empty((N, nq, nq)), np.empty((N, nq)))
         return float(0.5 * (applied + pushed) + tracking * self._units.force**2)
 
     def _rows(self, guess: Guess) -> Rows:
@@ -157,7 +155,12 @@ class HorizonProgram:
         rng, N, W = np.random.default_rng(0), self.horizon.steps, self._belief.wrench_map
         vectors = rng.normal(size=(2 * N + 3, len(W))) @ W
         turns = exponential(vectors[:, 3:])
-        path = Path(vectors[: N + 1, :3], turns[: N + 1], np.concatenate([vectors[-1, :3], turns[-1]]), vectors[-2])
+        path = Path(
+            np.ascontiguousarray(vectors[: N + 1, :3]),
+            turns[: N + 1],
+            np.concatenate([vectors[-1, :3], turns[-1]]),
+            vectors[-2],
+        )
         guess = Guess(path, rng.normal(size=(N, len(W))), rng.normal(size=(N, len(self._belief.Q_f))))
         wanted = np.ascontiguousarray(vectors[N + 1 : 2 * N + 1, :3]), turns[N + 1 : 2 * N + 1]
         curvature = np.empty((N, len(W), len(W)))

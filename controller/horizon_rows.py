@@ -70,9 +70,11 @@ def defects(rows, units, wrench, force):  # type: ignore[no-untyped-def]
                 left += motion.by_wrench[t, r, c] * wrench[t, c] / units.wrench[c]
             for c in range(force.shape[1]):
                 left += motion.by_force[t, r, c] * force[t, c] / units.force
-            moved = max(moved, abs(left))
+            if abs(left) > moved or np.isnan(left):
+                moved = abs(left)
         for r in range(rows.off.shape[1]):
-            off = max(off, abs(rows.off[t, r]))
+            if abs(rows.off[t, r]) > off or np.isnan(rows.off[t, r]):
+                off = abs(rows.off[t, r])
     return moved, off
 
 

@@ -13,6 +13,6 @@ kernel = njit(cache=True, error_model="numpy", forceinline=False)
 inlined = njit(cache=True, error_model="numpy", forceinline=True)  # a call with ten arrays costs 0.1 us
 
 
-def elementwise(inputs: int, layout: str) -> Callable[..., Any]:
-    """A decorator: `inputs` float arrays and an output, broadcast over all axes but those that `layout` names."""
-    return guvectorize([f"void({', '.join(['f8[:]'] * (inputs + 1))})"], layout, cache=True)
+def elementwise(layout: str) -> Callable[..., Any]:
+    """A decorator: two float arrays and an output, broadcast over all axes but those that `layout` names."""
+    return guvectorize(["void(f8[:], f8[:], f8[:])"], layout, cache=True)

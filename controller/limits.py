@@ -28,18 +28,23 @@ class Limits(NamedTuple):
     orders: tuple[int, ...]
     rated: bool
 
-    def first(self, before: Array | None) -> tuple[Array, Array]:
-        """Right-hand sides of the first step, whose rates count from the wrench `before` it; None: unknown."""
-        out = []
-        for rows, side, rate in (
-            (self.linear, self.linear_side, self.linear_rate),
-            (self.cone, self.cone_side, self.cone_rate),
+    def place(self, sides: Array, first: tuple[int, int], before: Array | None) -> None:
+        """Write the right-hand sides of the first step among a program's, where its rates count from `before`.
+
+        Args:
+            sides: of the program.  first: where its rows in half-lines and those in cones begin.
+            before: (nw,) the wrench before it; None: unknown.
+        """
+        if not self.rated:
+            return
+        for begin, rows, side, rate in (
+            (first[0], self.linear, self.linear_side, self.linear_rate),
+            (first[1], self.cone, self.cone_side, self.cone_rate),
         ):
             if before is None:
-                out.append(np.where(rate & (side > 0.0), UNBOUNDED, side))
+                sides[begin : begin + len(side)] = np.where(rate & (side > 0.0), UNBOUNDED, side)
             else:
-                out.append(side + rate * (rows @ before))
-        return out[0], out[1]
+                sides[begin : begin + len(side)] = side + rate * (rows @ before)
 
 
 def friction_limits(mu: Array, floors: Array, dim: int) -> Limits:
@@ -90,5 +95,5 @@ def wrench_limits(bounds: WrenchBounds, nw: int, edges: int, unit: Array, h: flo
     return Limits(
         np.reshape(linear, (-1, nw)), np.array(sides[0]), np.array(rates[0], dtype=bool),
         np.reshape(cone, (-1, nw)), np.array(sides[1]), np.array(rates[1], dtype=bool), tuple(orders),
-        any(rates[0] + rates[1]),
+        bounds.rated,
     )  # fmt: skip

@@ -6,15 +6,14 @@ from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
-from pivoting.controller.conic_program import ClarabelInPlace, Solver, solver
+from pivoting.controller.conic_program import USABLE, ClarabelInPlace, Solver, solver
 from pivoting.controller.horizon import BodyState, Horizon
 from pivoting.controller.horizon_program import Guess, HorizonProgram
 from pivoting.controller.so3 import fill_differences, rotated
 from pivoting.controller.space import quaternion_product
 from pivoting.controller.transcription import Path
-from pivoting.controller.validate import Array, array, fail, number
+from pivoting.controller.validate import Array, array, fail, number, unit_quaternions
 
-RESIDUAL = 1e-6  # relative KKT residual of a pass's program up to which its answer is taken
 CONVERGED = 1e-9  # change of a pass, in weights, levers and radians
 STATUS = ("solved", "not converged", "infeasible", "failed")
 
@@ -148,20 +147,30 @@ class Planner:
         position[0], orientation[0] = start.position[0], start.orientation[0]
         position[1:], orientation[1:] = poses
         path = start._replace(position=position, orientation=orientation)
-        shapes = (N, len(belief.Q_w)), (N, len(belief.Q_f))
-        given = [np.zeros(shape) for shape in shapes] if forces is None else [np.array(values) for values in forces]
-        return Guess(path, *given)
+        zeros = np.zeros((N, len(belief.Q_w))), np.zeros((N, len(belief.Q_f)))
+        return Guess(path, *(zeros if forces is None else forces))
 
     def _begun(self, guess: Guess, start: Path) -> Guess:
         """A guess that was made for another state, from this one."""
-        N, belief = self.horizon.steps, self.horizon.controller.belief
+        N = self.horizon.steps
         if not isinstance(guess, Guess):
             raise fail("guess", guess, "a Guess, as `Plan.guess` or `Planner.guess` is")
-        shapes = tuple(np.shape(part) for part in (*guess.path[:2], guess.wrench, guess.force))
-        wanted = ((N + 1, 3), (N + 1, 4), (N, len(belief.Q_w)), (N, len(belief.Q_f)))
-        if shapes != wanted:
-            raise fail("guess", f"one of shapes {shapes}", f"of shapes {wanted}")
-        return self._about(start, (guess.path.position[1:], guess.path.orientation[1:]), (guess.wrench, guess.force))
+        position = array("guess.path.position", guess.path.position, (N + 1, 3))
+        orientation = unit_quaternions("guess.path.orientation", guess.path.orientation, (N + 1, 4))
+        return self._about(start, (position[1:], orientation[1:]), self._forces("guess", (guess.wrench, guess.force)))
+
+    def _forces(self, name: str, forces: tuple[Array, Array]) -> tuple[Array, Array]:
+        """Copies of wrenches (N, nw) and forces (N, K d)."""
+        N, belief = self.horizon.steps, self.horizon.controller.belief
+        if not isinstance(forces, tuple | list) or len(forces) != 2:
+            raise fail(name, forces, "wrenches (N, nw) and contact forces (N, K d)")
+        wrench, force = (
+            array(f"{name}: {what}", values, (N, size)).copy()  # that may be written: kernels tell the two apart
+            for what, values, size in zip(
+                ("wrenches", "forces"), forces, (len(belief.Q_w), len(belief.Q_f)), strict=True
+            )
+        )
+        return wrench, force
 
     def plan(
         self,
@@ -194,12 +203,14 @@ class Planner:
             raise fail("desired", desired, "positions (N, 3) and orientations (N, 4), as of `Horizon.arc`")
         if applied is not None:
             applied = array("applied", applied, (len(self.horizon.controller.Q_w),))
+        if guess is not None and forces is not None:
+            raise fail("forces", "given beside a guess", "left out: the guess has its own")
         began = perf_counter()
         start, wanted = self.horizon.start(state), self.horizon.desired(*desired)
         if guess is not None:
             guesses = [self._begun(guess, start)]
         elif forces is not None:
-            guesses = [self._about(start, wanted, forces)]
+            guesses = [self._about(start, wanted, self._forces("forces", forces))]
         else:
             guesses = [self._about(start, wanted), self._about(start, _still(start))]
         inside, tried = 0.0, 0
@@ -236,7 +247,7 @@ class Planner:
             answer = self._solve(program)
             inside, tried = inside + answer.seconds, tried + 1
             residual, said = answer.residual, answer.said
-            if not residual <= RESIDUAL:
+            if not residual <= USABLE:
                 if "infeasible" not in said.lower() and self.method != "clarabel":  # few backends prove it
                     said = f"{said}; clarabel: {ClarabelInPlace()(program).said}"
                 status = "infeasible" if "infeasible" in said.lower() else "failed"

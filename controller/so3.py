@@ -2,7 +2,7 @@
 
 import numpy as np
 from pivoting.controller.kernel import elementwise, kernel
-from pivoting.controller.space import IDENTITY, fill_product, rotation_error
+from pivoting.controller.space import fill_product, rotation_error
 from pivoting.controller.validate import Array
 
 _SMALL = 1e-4  # [rad]: below, the series is more accurate than the quotient
@@ -20,13 +20,7 @@ def turn(orientation, vector, out):  # type: ignore[no-untyped-def]
         out[i] /= length
 
 
-@elementwise(2, "(q),(v)->(q)")
-def turned(orientation, vector, out):  # type: ignore[no-untyped-def]
-    """(..., 4) unit quaternions turned by rotation vectors (..., 3) [rad] in the object's own axes."""
-    turn(orientation, vector, out)
-
-
-@elementwise(2, "(q),(v)->(v)")
+@elementwise("(q),(v)->(v)")
 def rotated(orientation, point, out):  # type: ignore[no-untyped-def]
     """(..., 3) points turned by unit quaternions (..., 4), shapes broadcast."""
     w, a, b, c = orientation[0], orientation[1], orientation[2], orientation[3]
@@ -39,7 +33,8 @@ def rotated(orientation, point, out):  # type: ignore[no-untyped-def]
 
 def exponential(vector: Array) -> Array:
     """(..., 4) unit quaternions of rotation vectors (..., 3) [rad]."""
-    return turned(IDENTITY, vector)
+    angle = np.linalg.norm(vector, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(0.5 * angle), 0.5 * np.sinc(angle / (2.0 * np.pi)) * vector], axis=-1)
 
 
 @kernel

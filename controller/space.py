@@ -121,7 +121,7 @@ def fill_product(p, q, out):  # type: ignore[no-untyped-def]
     out[0], out[1], out[2], out[3] = w, x, y, z
 
 
-@elementwise(2, "(q),(q)->(q)")
+@elementwise("(q),(q)->(q)")
 def quaternion_product(p, q, out):  # type: ignore[no-untyped-def]
     """Hamilton product of (..., 4) quaternions (w, x, y, z), shapes broadcast."""
     fill_product(p, q, out)

@@ -20,11 +20,16 @@ class Units(NamedTuple):
     pose: Array
 
 
+def lever(points: Array) -> float:
+    """[m] from the CoM to the mean of points (K, d); 0 if that is no more than rounding."""
+    reach, farthest = float(np.linalg.norm(points.mean(axis=0))), float(np.linalg.norm(points, axis=1).max())
+    return reach if reach > 1e-9 * farthest else 0.0
+
+
 def units(mass: float, gravity: Array, points: Array, dim: int) -> Units:
     """Of an object [kg] in `gravity` (3,) [m/s^2] with contacts at `points` (K, 3) from its CoM [m]."""
     force = mass * (float(np.linalg.norm(gravity)) or 1.0)
-    reach = float(np.linalg.norm(points.mean(axis=0)))
-    length = reach or float(np.linalg.norm(points, axis=1).max()) or 1.0
+    length = lever(points) or float(np.linalg.norm(points, axis=1).max()) or 1.0
     turns = 2 * dim - 3
     return Units(
         force, length, force * np.array([1.0] * dim + [length] * turns), np.array([length] * dim + [1.0] * turns)

@@ -79,7 +79,7 @@ class BoundedControl:
     def __init__(self, inner: Control, controller: WrenchController, bounds: WrenchBounds, dt: float):
         self._inner, self._controller, self._dt = inner, controller, dt
         self._bounds = bounds.stacked(len(controller.Q_w))
-        self._rated = bool(self._bounds.rate.any())
+        self._rated = bounds.rated
         self._solve = BoundedSolver(controller, bounds, dt)
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
@@ -104,6 +104,7 @@ class BoundedControl:
     def prepare(self, states: States, out: Answers) -> None:
         """Compile, and set the solver up."""
         self._inner.prepare(states, out)
+        fill_excess(self._bounds, out.wrench, out.wrench, self._dt, np.empty(len(out.wrench)))
         for _ in range(2):  # set up, then in place
             jacobian = self._controller.jacobian(states.orientation[0])
             self._solve(states.orientation[0], jacobian @ out.force[0] + out.wrench[0])
@@ -197,7 +198,8 @@ class HorizonControl:
         """Compile, and set the first world's solver up."""
         state = BodyState(*(np.array(values[0]) for values in states))
         for _ in range(2):
-            self._horizons[0].replan(state, self._wanted[0], None)
+            now = self._horizons[0].replan(state, self._wanted[0], None)
+        followed_motion(now, state, self._times)
         for values, still in zip(self._motions, (state.orientation, np.zeros(3), np.zeros(3)), strict=True):
             values[:] = still
         self._follow(0, states, out)

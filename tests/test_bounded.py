@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pivoting.controller import Body, Contact, Law, Motion, WrenchBounds, WrenchController, solve
 from pivoting.controller.bounded import BREAK, GIVE_UP, BoundedSolver
+from pivoting.controller.conic_program import POOR, ClarabelInPlace
 
 G = 10.0
 
@@ -138,3 +139,30 @@ def test_excess_is_relative_to_the_bound() -> None:
     assert bounds.excess(np.array([3.0, 4.0, 0.5]), np.zeros(3), 0.25) == pytest.approx(1.0)
     with pytest.raises(ValueError, match="component"):
         bounds.balls(6)
+
+
+def test_an_answer_is_asked_for_again_with_the_users_own_options() -> None:
+    """With four iterations there is no good answer: the careful try has four as well, and the better one counts."""
+    solver = BoundedSolver(planar(), WrenchBounds(force=6.0), 0.05)
+    few = ClarabelInPlace(max_iter=4)
+    programs = []
+    solver._solve = lambda program: (programs.append(program), few(program))[1]
+    q, _, required = stated(planar(), 0.3)
+    poor = solver(q, required)
+    (program,) = programs
+    assert POOR < poor.residual == min(few(program).residual, ClarabelInPlace(max_iter=4)(program).residual)
+    assert ClarabelInPlace()(program).residual <= POOR
+    assert "MaxIterations" in few(program).said
+
+
+def test_contacts_on_all_sides_of_the_centre_have_a_length() -> None:
+    """Their mean is not quite the centre, by rounding: no unit of length."""
+    points = [(0.1, 0.0), (0.2, 0.0), (-0.3, 0.0)]
+    contacts = [Contact(point, 0.3) for point in points]
+    assert 0.0 < np.linalg.norm(np.mean(points, axis=0)) < 1e-16
+    with pytest.raises(ValueError, match="away from the centre of mass, or Q_w given"):
+        WrenchController(Body(1.0, 0.1), contacts, Law.static(), [0.0, -G])
+    controller = WrenchController(Body(1.0, 0.1), contacts, Law.static(), [0.0, -G], Q_w=np.eye(3))
+    assert controller.units.length == pytest.approx(0.3)
+    q, _, required = stated(controller, 0.0)
+    assert BoundedSolver(controller, WrenchBounds(force=5.0), 0.05)(q, required).residual < POOR
