@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.bounded import BoundedSolver
 from pivoting.controller.bounds import WrenchBounds, fill_excess
+from pivoting.controller.conic_program import USABLE
 from pivoting.controller.controller import WrenchController, step_worlds
 from pivoting.controller.horizon import BodyState
 from pivoting.controller.plan import Plan, PlanError, Planner
@@ -16,7 +17,7 @@ from pivoting.controller.solution import STATUS
 Array = NDArray[np.float64]
 TOLERANCE = 1e-9  # relative KKT residual of an answer that counts as solved
 OVER = 1e-9  # of a bound: a wrench that exceeds it by more is solved for again, within bounds
-USABLE = 1e-3  # relative KKT residual within bounds: a poorer answer than asked is better than none
+BETTER_THAN_NONE = 1e-3  # relative KKT residual within bounds
 BOUNDED, INACCURATE, FAILED = (STATUS.index(word) for word in ("bounded", "inaccurate", "failed"))
 
 
@@ -92,11 +93,11 @@ class BoundedControl:
         for i in np.flatnonzero(excess > OVER):
             required = self._controller.jacobian(states.orientation[i]) @ out.force[i] + out.wrench[i]
             answer = self._solve(states.orientation[i], required, None if last is None else last[i])
-            if not answer.residual <= USABLE:
+            if not answer.residual <= BETTER_THAN_NONE:
                 out.wrench[i], out.status[i] = np.nan, FAILED
                 continue
             out.wrench[i], out.force[i], out.residual[i] = answer.wrench, answer.force.ravel(), answer.residual
-            if answer.residual > 1e-6:
+            if answer.residual > USABLE:
                 out.status[i] = INACCURATE
             elif not answer.exact:
                 out.status[i] = BOUNDED
