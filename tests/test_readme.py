@@ -54,6 +54,9 @@ def test_results_are_the_committed_ones() -> None:
     loop = json.loads((ROOT / "benchmarks/results/loop.json").read_text())["figures"]
     for key in ("one world: closed / bare mj_step", "256 worlds: closed / open Batch.step"):
         assert f"{loop[key]:.2f} x" in TEXT
+    words = " ".join(TEXT.split())
+    assert f"`mpc-2d` runs {loop['mpc-2d: times real time']:.2f} times as fast as real time" in words
+    assert f"`mpc-3d` {loop['mpc-3d: times real time']:.2f} times" in words
 
 
 def test_agreement_with_clarabel_is_the_committed_one() -> None:
