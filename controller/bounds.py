@@ -140,3 +140,58 @@ def fill_excess(stacked, wrench, before, dt, out):  # type: ignore[no-untyped-de
         out[i] = worst
         most = max(most, -1.0 if np.isnan(worst) else worst)
     return most
+
+
+@kernel
+def size_over(stacked, k, wrench):  # type: ignore[no-untyped-def]
+    """|rows w| over the radius of ball k, of a wrench (nw,)."""
+    square = 0.0
+    for row in range(stacked.first[k], stacked.first[k + 1]):
+        value = 0.0
+        for j in range(wrench.shape[0]):
+            value += stacked.rows[row, j] * wrench[j]
+        square += value * value
+    return np.sqrt(square) / stacked.radius[k]
+
+
+@kernel
+def farthest_exceeded(stacked, wrench):  # type: ignore[no-untyped-def]
+    """The ball, not of a rate, that a wrench (nw,) exceeds the farthest; -1 if it is within all."""
+    found, worst = -1, 1.0
+    for k in range(stacked.radius.shape[0]):
+        size = -1.0 if stacked.rate[k] else size_over(stacked, k, wrench)
+        if size > worst:
+            found, worst = k, size
+    return found
+
+
+@kernel
+def fill_heavier(stacked, k, multiplier, Q_w, out):  # type: ignore[no-untyped-def]
+    """Write Q_w + multiplier rows' rows of ball k: where that makes |rows w| the radius, w is the best within it.
+
+    The Lagrangian of the bound, 1/2 multiplier (|rows w|^2 - radius^2), is a weight.
+    """
+    out[:] = Q_w
+    for row in range(stacked.first[k], stacked.first[k + 1]):
+        for i in range(out.shape[0]):
+            for j in range(out.shape[0]):
+                out[i, j] += multiplier * stacked.rows[row, i] * stacked.rows[row, j]
+
+
+@kernel
+def next_multiplier(root, size):  # type: ignore[no-untyped-def]
+    """The multiplier to try after root[0] gave `size` over the radius, which falls as it grows; kept in `root` (5,).
+
+    A secant in 1 / size, which is nearly a line (as in trust regions, More and Sorensen 1983), within a bracket.
+    root: the multiplier, the one before and its 1 / size - 1, the bracket; at first (0, 0, 0, 0, inf).
+    """
+    now, value = root[0], 1.0 / size - 1.0
+    if value < 0.0:
+        root[3] = now
+    else:
+        root[4] = now
+    step = -value * (now - root[1]) / (value - root[2]) if value != root[2] else 0.0
+    guess = now + step
+    if not root[3] < guess < root[4]:
+        guess = 0.5 * (root[3] + root[4]) if np.isfinite(root[4]) else 2.0 * now
+    root[0], root[1], root[2] = guess, now, value

@@ -56,14 +56,17 @@ class LawControl:
 
     Args:
         desired: (N+1, 4), (N+1, 3), (N+1, 3), the reference at every step.
+        bounds: on the wrench.
     """
 
-    def __init__(self, controller: WrenchController, desired: tuple[Array, Array, Array]):
+    def __init__(self, controller: WrenchController, desired: tuple[Array, Array, Array], bounds: WrenchBounds):
         self._belief, self._work, self._desired = controller.belief, controller.workspace(), desired
+        self._bounds = bounds.stacked(len(controller.Q_w))
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
         now = [values[k : k + 1] for values in self._desired]
-        step_worlds(self._belief, self._work, TOLERANCE, states.orientation, states.angular_velocity, *now, *out)
+        measured = states.orientation, states.angular_velocity
+        step_worlds(self._belief, self._bounds, self._work, TOLERANCE, *measured, *now, *out)
 
     def prepare(self, states: States, out: Answers) -> None:
         """Compile."""
@@ -71,7 +74,7 @@ class LawControl:
 
 
 class BoundedControl:
-    """Another control within bounds: a wrench that exceeds one is solved for again, see `BoundedSolver`.
+    """Another control within bounds: a wrench that still exceeds one is solved for again, see `BoundedSolver`.
 
     Args:
         dt: time step [s].
@@ -175,6 +178,7 @@ class HorizonControl:
     ):
         self._horizons, self._dt, self._every = horizons, dt, every
         self._belief, self._work = controller.belief, controller.workspace()
+        self._bounds = horizons[0].planner.horizon.bounds.stacked(len(controller.Q_w))
         W, P = len(horizons), -(-steps // every)
         times = every * dt * np.arange(P)[:, None] + horizons[0].planner.horizon.times
         wanted = np.asarray(reference(times.ravel()).orientation)
@@ -208,7 +212,8 @@ class HorizonControl:
     def _follow(self, k: int, states: States, out: Answers) -> None:
         """The per-step law; nothing, where the object was let go."""
         now = [values[k % self._every] for values in self._motions]
-        step_worlds(self._belief, self._work, TOLERANCE, states.orientation, states.angular_velocity, *now, *out)
+        measured = states.orientation, states.angular_velocity
+        step_worlds(self._belief, self._bounds, self._work, TOLERANCE, *measured, *now, *out)
         for i in self._released:
             for values in out:
                 values[i] = 0

@@ -94,13 +94,13 @@ def simulate(
     for values in start:
         values.flags.writeable = False
 
-    control: Control = LawControl(attached.controller, told)
+    bounds = case.bounds()
+    control: Control = LawControl(attached.controller, told, bounds)
     horizons = played = None
     if open_loop:
         control = played = play_control(case, attached, believed, follow, dt, steps)
     elif case.plan_hz is not None:
         control = horizons = horizon_control(case, attached, believed, follow, int(worlds), dt, steps)
-    bounds = case.bounds()
     if bounds.any and not open_loop:  # a plan is within them
         control = BoundedControl(control, attached.controller, bounds, dt)
     log = _loop(batch, control, attached.controller, truth, where, steps, progress)

@@ -8,6 +8,7 @@ import pytest
 from pivoting.controller import Body, Contact, Law, Motion, WrenchBounds, WrenchController, solve
 from pivoting.controller.bounded import BREAK, GIVE_UP, BoundedSolver
 from pivoting.controller.conic_program import POOR, ClarabelInPlace
+from pivoting.controller.controller import step_worlds
 
 G = 10.0
 
@@ -166,3 +167,46 @@ def test_contacts_on_all_sides_of_the_centre_have_a_length() -> None:
     assert controller.units.length == pytest.approx(0.3)
     q, _, required = stated(controller, 0.0)
     assert BoundedSolver(controller, WrenchBounds(force=5.0), 0.05)(q, required).residual < POOR
+
+
+@pytest.mark.parametrize(("controller", "kind"), CASES, ids=[kind for _, kind in CASES])
+def test_a_bound_is_a_heavier_weight(controller: WrenchController, kind: str) -> None:
+    """The loop's own answers within a bound are those of the cone program, and not dearer; what it cannot hold is left.
+
+    Clarabel stops at 1e-12 of the cost, so that its wrenches are 1e-5 off where the cost is flat.
+    """
+    rng, still, held, left = np.random.default_rng(5), np.zeros((1, 3)), 0, 0
+    nw, n, dim = len(controller.Q_w), len(controller.Q_f), controller.space.dim
+    belief, work, units = controller.belief, controller.workspace(), controller.units
+
+    def step(bounds: WrenchBounds, angle: float, wanted: float) -> tuple[np.ndarray, ...]:
+        out = np.empty((1, nw)), np.empty((1, n)), np.empty(1), np.empty(1, np.int8)
+        q, q_d = tilted(angle)[None], tilted(wanted)[None]
+        step_worlds(belief, bounds.stacked(nw), work, 1e-9, q, still, q_d, still, still, *out)
+        assert out[3][0] == 0
+        return tuple(values[0] for values in out)
+
+    def cost(wrench: np.ndarray, force: np.ndarray) -> float:
+        return float(wrench @ controller.Q_w @ wrench + force @ controller.Q_f @ force)
+
+    for case in range(100):
+        angle = rng.uniform(0.05, 1.4)
+        wanted = angle + rng.normal() * 0.02
+        free, force, *_ = step(WrenchBounds(), angle, wanted)
+        most = np.linalg.norm(free[:dim]) if case % 2 else np.linalg.norm(free[dim:])
+        bounds = WrenchBounds(**{"force" if case % 2 else "moment": rng.uniform(0.6, 0.99) * most})
+        wrench, pushed, *_ = step(bounds, angle, wanted)
+        required = controller.jacobian(tilted(angle)) @ force + free
+        if bounds.excess(wrench) > 1e-9:
+            left += 1
+            np.testing.assert_array_equal(wrench, free)
+            continue
+        other = BoundedSolver(controller, bounds, 0.05)(tilted(angle), required)
+        assert other.exact
+        assert np.abs((wrench - other.wrench) / units.wrench).max() <= 3e-5
+        assert cost(wrench, pushed) <= cost(other.wrench, other.force.ravel()) * (1.0 + 1e-8)
+        balance = controller.jacobian(tilted(angle)) @ pushed + wrench - required
+        assert np.abs(balance / units.wrench).max() <= 1e-12
+        held += 1
+    assert held >= 50
+    assert left >= 1

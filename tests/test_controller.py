@@ -5,13 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pivoting.controller import Body, Contact, Law, Motion, WrenchController, solve
+from pivoting.controller import Body, Contact, Law, Motion, WrenchBounds, WrenchController, solve
 from pivoting.controller.controller import step_worlds, world_wrench
 from pivoting.controller.stale import drop_stale_kernels
 
 BLOCK = WrenchController(
     Body(2.0, 0.3), [Contact((-0.4, -0.6), 0.35, f_min=3.0)], Law.dynamic(), (1.0, -9.0), margin=0.1
 )
+
+FREE = WrenchBounds().stacked(3)
 
 
 def at(desired: Motion) -> list[np.ndarray]:
@@ -26,7 +28,7 @@ def test_many_worlds_are_as_many_problems() -> None:
     wrench, force, residual, status = np.empty((50, 3)), np.empty((50, 2)), np.empty(50), np.empty(50, np.int8)
     q, omega = BLOCK.space.orientation(thetas), BLOCK.space.axial(omegas)
     out = (wrench, force, residual, status)
-    step_worlds(BLOCK.belief, BLOCK.workspace(), 1e-9, q, omega, *at(desired), *out)
+    step_worlds(BLOCK.belief, FREE, BLOCK.workspace(), 1e-9, q, omega, *at(desired), *out)
     assert not status.any()
     for i in range(50):
         solution = solve(BLOCK.problem(Motion(thetas[i], omegas[i]), desired))
@@ -40,7 +42,7 @@ def test_a_state_that_is_not_a_number_has_no_answer_and_applies_nothing() -> Non
     omega = np.zeros((2, 3))
     wrench, force, residual, status = np.ones((2, 3)), np.ones((2, 2)), np.zeros(2), np.zeros(2, np.int8)
     out = (wrench, force, residual, status)
-    step_worlds(BLOCK.belief, BLOCK.workspace(), 1e-9, q, omega, *at(Motion(0.5)), *out)
+    step_worlds(BLOCK.belief, FREE, BLOCK.workspace(), 1e-9, q, omega, *at(Motion(0.5)), *out)
     assert status.tolist() == [0, 2]
     assert np.isnan(wrench[1]).all()
     applied = np.ones((2, 6))
@@ -53,7 +55,7 @@ def test_a_tolerance_that_is_not_met_is_a_status() -> None:
     q, omega = BLOCK.space.orientation(np.array([0.5])), np.zeros((1, 3))
     wrench, force, residual, status = np.ones((1, 3)), np.ones((1, 2)), np.zeros(1), np.zeros(1, np.int8)
     out = (wrench, force, residual, status)
-    step_worlds(BLOCK.belief, BLOCK.workspace(), -1.0, q, omega, *at(Motion(0.5)), *out)
+    step_worlds(BLOCK.belief, FREE, BLOCK.workspace(), -1.0, q, omega, *at(Motion(0.5)), *out)
     assert status.tolist() == [1]
 
 
