@@ -90,9 +90,9 @@ class Poor(BoundedSolver):
 
 
 def test_a_poor_answer_within_bounds_is_applied_and_said_to_be_poor(monkeypatch: pytest.MonkeyPatch) -> None:
-    """None at all would let the object fall."""
+    """None at all would let the object fall. Two bounds at once are more than a heavier weight."""
     monkeypatch.setattr(control, "BoundedSolver", Poor)
-    run = simulate("balance-2d", seconds=0.6, force_max=3.0)
+    run = simulate("balance-2d", seconds=0.6, force_max=3.3, moment_max=0.9)
     assert np.isfinite(run.wrench).all()
     assert run.measures.unsolved_steps[0] > 0.0
     assert set(np.unique(run.status)) <= {0, 1}
