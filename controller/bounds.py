@@ -90,7 +90,7 @@ class WrenchBounds:
         return tuple(ball for ball in out if np.isfinite(ball.radius))
 
     def stacked(self, nw: int) -> Stacked:
-        """The same as arrays, for `fill_excess`."""
+        """The same as arrays, for compiled functions."""
         balls = self.balls(nw)
         heights = [len(ball.rows) for ball in balls]
         return Stacked(
@@ -123,18 +123,13 @@ def fill_excess(stacked, wrench, before, dt, out):  # type: ignore[no-untyped-de
         stacked: of `WrenchBounds.stacked`.
         before: (W, nw) applied `dt` [s] earlier; the wrenches themselves leave rates out.
     """
-    most = -1.0
+    most, rate = -1.0, np.empty(wrench.shape[1])
     for i in range(wrench.shape[0]):
         worst = -1.0
+        for j in range(wrench.shape[1]):
+            rate[j] = (wrench[i, j] - before[i, j]) / dt
         for k in range(stacked.radius.shape[0]):
-            square = 0.0
-            for row in range(stacked.first[k], stacked.first[k + 1]):
-                value = 0.0
-                for j in range(wrench.shape[1]):
-                    change = (wrench[i, j] - before[i, j]) / dt if stacked.rate[k] else wrench[i, j]
-                    value += stacked.rows[row, j] * change
-                square += value * value
-            over = np.sqrt(square) / stacked.radius[k] - 1.0
+            over = (size_over(stacked, k, rate) if stacked.rate[k] else size_over(stacked, k, wrench[i])) - 1.0
             if over > worst or np.isnan(over):
                 worst = over
         out[i] = worst
@@ -143,13 +138,13 @@ def fill_excess(stacked, wrench, before, dt, out):  # type: ignore[no-untyped-de
 
 
 @kernel
-def size_over(stacked, k, wrench):  # type: ignore[no-untyped-def]
-    """|rows w| over the radius of ball k, of a wrench (nw,)."""
+def size_over(stacked, k, vector):  # type: ignore[no-untyped-def]
+    """|rows v| over the radius of ball k, v (nw,) a wrench or its rate."""
     square = 0.0
     for row in range(stacked.first[k], stacked.first[k + 1]):
         value = 0.0
-        for j in range(wrench.shape[0]):
-            value += stacked.rows[row, j] * wrench[j]
+        for j in range(vector.shape[0]):
+            value += stacked.rows[row, j] * vector[j]
         square += value * value
     return np.sqrt(square) / stacked.radius[k]
 
@@ -166,6 +161,36 @@ def farthest_exceeded(stacked, wrench):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def begin_multiplier(stacked, k, Q_w, root):  # type: ignore[no-untyped-def]
+    """Make `root` (6,) ready for `next_multiplier`: (multiplier, the last, its 1 / size - 1, bracket, unit)."""
+    row = stacked.rows[stacked.first[k]]
+    root[:] = 0.0
+    root[4] = np.inf
+    for j in range(row.shape[0]):
+        root[5] += row[j] * Q_w[j, j] * row[j]
+
+
+@kernel
+def next_multiplier(root, size):  # type: ignore[no-untyped-def]
+    """Write the multiplier to try after root[0] gave `size` over the radius, which falls as the multiplier grows.
+
+    A secant in 1 / size, which is nearly a line (as in trust regions, More and Sorensen 1983), within a bracket.
+    """
+    now, last, value = root[0], root[1], 1.0 / size - 1.0
+    if value < 0.0:
+        root[3] = now
+    else:
+        root[4] = now
+    if now == last:
+        guess = root[5] * (size - 1.0)  # the first
+    else:
+        guess = now if value == root[2] else now - value * (now - last) / (value - root[2])
+        if not root[3] < guess < root[4]:
+            guess = 0.5 * (root[3] + root[4]) if np.isfinite(root[4]) else 2.0 * now
+    root[0], root[1], root[2] = guess, now, value
+
+
+@kernel
 def fill_heavier(stacked, k, multiplier, Q_w, out):  # type: ignore[no-untyped-def]
     """Write Q_w + multiplier rows' rows of ball k: where that makes |rows w| the radius, w is the best within it.
 
@@ -176,22 +201,3 @@ def fill_heavier(stacked, k, multiplier, Q_w, out):  # type: ignore[no-untyped-d
         for i in range(out.shape[0]):
             for j in range(out.shape[0]):
                 out[i, j] += multiplier * stacked.rows[row, i] * stacked.rows[row, j]
-
-
-@kernel
-def next_multiplier(root, size):  # type: ignore[no-untyped-def]
-    """The multiplier to try after root[0] gave `size` over the radius, which falls as it grows; kept in `root` (5,).
-
-    A secant in 1 / size, which is nearly a line (as in trust regions, More and Sorensen 1983), within a bracket.
-    root: the multiplier, the one before and its 1 / size - 1, the bracket; at first (0, 0, 0, 0, inf).
-    """
-    now, value = root[0], 1.0 / size - 1.0
-    if value < 0.0:
-        root[3] = now
-    else:
-        root[4] = now
-    step = -value * (now - root[1]) / (value - root[2]) if value != root[2] else 0.0
-    guess = now + step
-    if not root[3] < guess < root[4]:
-        guess = 0.5 * (root[3] + root[4]) if np.isfinite(root[4]) else 2.0 * now
-    root[0], root[1], root[2] = guess, now, value

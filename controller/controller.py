@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.bounds import farthest_exceeded, fill_heavier, next_multiplier, size_over
+from pivoting.controller.bounds import begin_multiplier, farthest_exceeded, fill_heavier, next_multiplier, size_over
 from pivoting.controller.contacts import Contact, fill_jacobian
 from pivoting.controller.dispatch import smallest_wrench, workspace
 from pivoting.controller.kernel import inlined, kernel
@@ -213,38 +213,29 @@ def step_worlds(belief, bounds, work, tolerance, q, omega, q_d, omega_d, alpha_d
     """
     nw, n = belief.wrench_map.shape[0], belief.points.shape[0] * belief.force_map.shape[1]
     R, J, b = np.empty((3, 3)), np.empty((nw, n)), np.empty(nw)
-    Q, root = np.empty((nw, nw)), np.empty(5)
+    Q, root = np.empty((nw, nw)), np.empty(6)
     Q_w, Q_f, mu, f_min = belief.Q_w, belief.Q_f, belief.mu, belief.f_min  # taken out once: it shows in the plane
     for i in range(q.shape[0]):
         j = i % q_d.shape[0]
         _fill_problem(belief, q[i], omega[i], q_d[j], omega_d[j], alpha_d[j], R, J, b)
-        Q[:], ball, left = Q_w, -1, ATTEMPTS
-        while True:
+        Q[:], ball = Q_w, -1
+        for attempt in range(ATTEMPTS + 1):
             residual[i] = smallest_wrench(J, b, Q, Q_f, mu, f_min, force[i], wrench[i], work[0], work[1])
-            if left == 0 or not np.isfinite(residual[i]):
-                break
-            if ball < 0:
+            if attempt == 0:
                 ball = farthest_exceeded(bounds, wrench[i])
-                if ball < 0:
-                    break
-                row, size = bounds.rows[bounds.first[ball]], size_over(bounds, ball, wrench[i])
-                root[:4], root[4] = 0.0, np.inf
-                next_multiplier(root, size)
-                weight = 0.0
-                for j in range(nw):
-                    weight += row[j] * Q_w[j, j] * row[j]
-                root[0] = weight * (size - 1.0)
-            else:
-                size = size_over(bounds, ball, wrench[i])
-                if abs(size - 1.0) <= HELD:
-                    residual[i] = max(residual[i], abs(size - 1.0))
-                    break
-                next_multiplier(root, size)
-            left = left - 1 if root[0] <= HEAVIEST * weight else 0
-            if left:
+                if ball >= 0:
+                    begin_multiplier(bounds, ball, Q_w, root)
+            if ball < 0 or not np.isfinite(residual[i]):
+                break
+            size = size_over(bounds, ball, wrench[i])
+            if abs(size - 1.0) <= HELD:
+                residual[i] = max(residual[i], abs(size - 1.0))
+                break
+            next_multiplier(root, size)
+            if attempt < ATTEMPTS - 1 and root[0] <= HEAVIEST * root[5]:
                 fill_heavier(bounds, ball, root[0], Q_w, Q)
             else:  # out of reach: as without bounds
-                Q[:] = Q_w
+                Q[:], ball = Q_w, -1
         if not np.isfinite(residual[i]):
             status[i] = FAILED
             wrench[i, :] = np.nan

@@ -51,6 +51,19 @@ class Control(Protocol):
         ...
 
 
+class _Law:
+    """The controller's law for all worlds, as far as the compiled loop keeps bounds."""
+
+    def __init__(self, controller: WrenchController, bounds: WrenchBounds):
+        self._belief, self._work = controller.belief, controller.workspace()
+        self._bounds = bounds.stacked(len(controller.Q_w))
+
+    def __call__(self, states: States, desired: list[Array], out: Answers) -> None:
+        """`desired`: orientations, angular velocities and accelerations, see `step_worlds`."""
+        measured = states.orientation, states.angular_velocity
+        step_worlds(self._belief, self._bounds, self._work, TOLERANCE, *measured, *desired, *out)
+
+
 class LawControl:
     """The per-step law on a reference, the same for all worlds.
 
@@ -60,13 +73,10 @@ class LawControl:
     """
 
     def __init__(self, controller: WrenchController, desired: tuple[Array, Array, Array], bounds: WrenchBounds):
-        self._belief, self._work, self._desired = controller.belief, controller.workspace(), desired
-        self._bounds = bounds.stacked(len(controller.Q_w))
+        self._law, self._desired = _Law(controller, bounds), desired
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
-        now = [values[k : k + 1] for values in self._desired]
-        measured = states.orientation, states.angular_velocity
-        step_worlds(self._belief, self._bounds, self._work, TOLERANCE, *measured, *now, *out)
+        self._law(states, [values[k : k + 1] for values in self._desired], out)
 
     def prepare(self, states: States, out: Answers) -> None:
         """Compile."""
@@ -177,8 +187,7 @@ class HorizonControl:
         steps: int,
     ):
         self._horizons, self._dt, self._every = horizons, dt, every
-        self._belief, self._work = controller.belief, controller.workspace()
-        self._bounds = horizons[0].planner.horizon.bounds.stacked(len(controller.Q_w))
+        self._law = _Law(controller, horizons[0].planner.horizon.bounds)
         W, P = len(horizons), -(-steps // every)
         times = every * dt * np.arange(P)[:, None] + horizons[0].planner.horizon.times
         wanted = np.asarray(reference(times.ravel()).orientation)
@@ -211,9 +220,7 @@ class HorizonControl:
 
     def _follow(self, k: int, states: States, out: Answers) -> None:
         """The per-step law; nothing, where the object was let go."""
-        now = [values[k % self._every] for values in self._motions]
-        measured = states.orientation, states.angular_velocity
-        step_worlds(self._belief, self._bounds, self._work, TOLERANCE, *measured, *now, *out)
+        self._law(states, [values[k % self._every] for values in self._motions], out)
         for i in self._released:
             for values in out:
                 values[i] = 0
