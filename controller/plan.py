@@ -164,13 +164,9 @@ class Planner:
         N, belief = self.horizon.steps, self.horizon.controller.belief
         if not isinstance(forces, tuple | list) or len(forces) != 2:
             raise fail(name, forces, "wrenches (N, nw) and contact forces (N, K d)")
-        wrench, force = (
-            array(f"{name}: {what}", values, (N, size)).copy()  # that may be written: kernels tell the two apart
-            for what, values, size in zip(
-                ("wrenches", "forces"), forces, (len(belief.Q_w), len(belief.Q_f)), strict=True
-            )
-        )
-        return wrench, force
+        wrench = array(f"{name}: wrenches", forces[0], (N, len(belief.Q_w)))
+        force = array(f"{name}: forces", forces[1], (N, len(belief.Q_f)))
+        return wrench.copy(), force.copy()  # that may be written: kernels tell the two apart
 
     def plan(
         self,
