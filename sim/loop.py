@@ -129,6 +129,7 @@ def simulate(
         quaternion=_worlds_first(read["quaternion"]),
         velocity=_worlds_first(read["velocity"]),
         angular_velocity=_worlds_first(read["angular_velocity"]),
+        required=_worlds_first(log.required),
         wrench=_worlds_first(log.wrench),
         wrench_world=_worlds_first(log.wrench_world),
         force=_worlds_first(log.force).reshape(worlds, steps, K, d),
@@ -219,6 +220,7 @@ class _Log(NamedTuple):
     """What the loop keeps, time first: sensors (N+1, W, ...), answers (N, W, ...), control_ns (N,), wall_s."""
 
     sensors: Array
+    required: Array
     wrench: Array
     wrench_world: Array
     force: Array
@@ -253,6 +255,7 @@ def _loop(
     nw, n = belief.wrench_map.shape[0], belief.Q_f.shape[0]
     log = _Log(
         sensors=np.empty((steps + 1, *sensordata.shape)),
+        required=np.empty((steps, worlds, nw)),
         wrench=np.empty((steps, worlds, nw)),
         wrench_world=np.empty((steps, worlds, 6)),
         force=np.empty((steps, worlds, n)),
@@ -261,8 +264,8 @@ def _loop(
         control_ns=np.empty(steps),
         wall_s=0.0,
     )
-    sensors, wrench, wrench_world, force, residual, status, spent, _ = log
-    control.prepare(states, Answers(wrench[0], force[0], residual[0], status[0]))  # compiled before it is timed
+    sensors, required, wrench, wrench_world, force, residual, status, spent, _ = log
+    control.prepare(states, Answers(required[0], wrench[0], force[0], residual[0], status[0]))  # before it is timed
     world_wrench(belief.wrench_map, states.orientation, wrench[0], wrench_world[0])
     sensors[0] = sensordata
     report = max(1, steps // 100)
@@ -270,7 +273,7 @@ def _loop(
     for k in range(steps):
         tick = perf_counter_ns()
         before = wrench[k - 1] if k else None
-        control(k, states, before, Answers(wrench[k], force[k], residual[k], status[k]))
+        control(k, states, before, Answers(required[k], wrench[k], force[k], residual[k], status[k]))
         spent[k] = perf_counter_ns() - tick
         world_wrench(belief.wrench_map, states.orientation, wrench[k], wrench_world[k])
         xfrc[:] = wrench_world[k]
