@@ -85,14 +85,17 @@ def _of_its_joints(model: mujoco.MjModel, joints: set[int]) -> Iterator[str]:
         dof = int(model.jnt_dofadr[joint])
         dofs = slice(dof, dof + (6 if int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_FREE) else 1))
         found = {
-            "stiffness": np.any(model.jnt_stiffness[joint]) or np.any(model.jnt_stiffnesspoly[joint]),
-            "limited": bool(model.jnt_limited[joint]),
-            "armature": np.any(model.dof_armature[dofs]),
-            "damping that is not linear": np.any(model.dof_dampingpoly[dofs]),
+            "stiffness": np.concatenate(
+                [np.ravel(model.jnt_stiffness[joint]), np.ravel(model.jnt_stiffnesspoly[joint])]
+            ),
+            "limited": np.ravel(model.jnt_limited[joint]),
+            "armature": model.dof_armature[dofs],
+            "dampingpoly": np.ravel(model.dof_dampingpoly[dofs]),
         }
-        for attribute, there in found.items():
-            if there:
-                yield f"its joint {_called(model, OBJ.mjOBJ_JOINT, joint)} has {attribute}"
+        for attribute, values in found.items():
+            if np.any(values):
+                value = float(np.abs(np.asarray(values, dtype=float)).max())
+                yield f"its joint {_called(model, OBJ.mjOBJ_JOINT, joint)} has {attribute} = {value:g}"
 
 
 def _constraints(model: mujoco.MjModel, body: int, joints: set[int], tendons: set[int]) -> Iterator[str]:

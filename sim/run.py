@@ -54,6 +54,7 @@ class Run:
         desired: the same as orientations (N+1, 4), angular velocities and accelerations (N+1, 3), world axes.
         position: (W, N+1, 3) CoM, world axes [m].  quaternion: (W, N+1, 4) object to world.
         velocity, angular_velocity: (W, N+1, 3) of the CoM, world axes [m/s, rad/s].
+        required: (W, N, nw) what the solved problem required, J f + w, object axes [N, N m].
         wrench: (W, N, 3 or 6) object axes, (F_u, F_v, M) in the plane [N, N m]; nan where there was no
             answer, and then none is applied.
         wrench_world: (W, N, 6) applied force and torque at the CoM, world axes.
