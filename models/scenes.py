@@ -10,7 +10,7 @@ import numpy as np
 from pivoting.models.frames import Array
 from pivoting.models.friction import contact_friction, read_friction
 from pivoting.models.naming import ModelError, body_id
-from pivoting.models.reading import FILE_FRAME, initial_data
+from pivoting.models.reading import FILE_FRAME, degrees_of_freedom, initial_data
 from pivoting.models.solver_settings import choose
 from pivoting.models.supports import can_collide, find_support
 
@@ -138,6 +138,7 @@ def load(
         part.name = part.name or f"#{part.id}"
     index = body_id(raw, body)
     name = raw.body(index).name or f"#{index}"
+    degrees_of_freedom(raw, index)
     ground = find_support(raw, initial_data(raw), index, support)
     own, table = spec.body(name), spec.geom(raw.geom(ground).name or f"#{ground}")
     spec.compiler.fusestatic = bool(own.joints)  # what hangs on it rigidly is part of it

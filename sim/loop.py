@@ -16,6 +16,7 @@ from pivoting.controller.validate import fail
 from pivoting.models.candidates import NEAR
 from pivoting.models.frames import matrix
 from pivoting.models.friction import read_friction
+from pivoting.models.naming import ModelError
 from pivoting.models.reading import initial_data, place, read_body, turn
 from pivoting.models.scenes import Scene, load
 from pivoting.models.sensors import instrument
@@ -24,6 +25,7 @@ from pivoting.sim.attach import Attached, attach
 from pivoting.sim.contact_readings import Declared
 from pivoting.sim.control import BoundedControl, Control, LawControl
 from pivoting.sim.fidelity import ContactRows, read_rows
+from pivoting.sim.joint_drag import drag_wrench
 from pivoting.sim.keys import CONTROL_KEYS
 from pivoting.sim.plan import Plan, planned, transplanted
 from pivoting.sim.planning import horizon_control, play_control
@@ -103,8 +105,11 @@ def simulate(
         values.flags.writeable = False
 
     bounds = case.bounds()
-    control: Control = LawControl(attached.controller, told, bounds)
+    drag = drag_wrench(attached.body, attached.controller, *told[:2])
+    control: Control = LawControl(attached.controller, told, bounds, drag)
     horizons = played = None
+    if attached.body.drag is not None and (open_loop or case.plan_hz is not None):
+        raise ModelError(f"body = {attached.body.name!r}: a plan knows no joint damping or friction; must have none")
     if open_loop:
         control = played = play_control(case, attached, believed, follow, dt, steps)
     elif case.plan_hz is not None:
