@@ -151,8 +151,8 @@ class Scenario:
     @property
     def duration(self) -> float:
         """Simulated time [s]."""
-        motion = self.motion
-        return motion.duration if isinstance(motion, MinimumJerk) and self.reference is not motion else self.seconds
+        ends = isinstance(self.reference, str) and np.isfinite(self.motion.duration)
+        return self.motion.duration if ends else self.seconds
 
     @property
     def changes(self) -> dict[str, Any]:
