@@ -46,7 +46,8 @@ def load(
         ModelError: the file is not MJCF, or has nothing that a key could change.
     """
     if not path.is_file():  # MuJoCo would print a warning of its own
-        raise ModelError(f"model = {str(path)!r}: not a readable MJCF file (there is no such file)")
+        why = "it is a directory" if path.is_dir() else "there is no such file"
+        raise ModelError(f"model = {str(path)!r}: not a readable MJCF file ({why})")
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except ValueError as error:

@@ -10,6 +10,7 @@ from pivoting.controller.space import quaternion_product
 from pivoting.models.candidates import Stance, planar_stance, stance, support_points
 from pivoting.models.reading import ModelError, RigidBody, matrix, quaternion, read_body
 from pivoting.sim.keys import LOWEST
+from pivoting.sim.relative import Load, load
 from pivoting.sim.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -38,6 +39,12 @@ class Plan:
     start: Array
     range: tuple[float, float]
     face: Array
+
+    @property
+    def load(self) -> Load:
+        """What values of the scenario may be relative to."""
+        points = np.array([self.body.point(contact) for contact in self.contacts])
+        return load(self.body.mass, self.body.gravity, points, self.radius)
 
 
 def planned(case: Scenario, model: mujoco.MjModel) -> Plan:
