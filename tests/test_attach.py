@@ -114,7 +114,7 @@ def test_friction_of_an_explicit_pair() -> None:
     [
         (scene(geom='condim="1"', extra="<default/>"), None),
         (scene(geom='contype="0" conaffinity="0"'), "no colliding geom"),
-        (scene(extra='<contact><exclude body1="world" body2="b"/></contact>'), "nothing that body 'b' can collide with"),
+        (scene(extra='<contact><exclude body1="world" body2="b"/></contact>'), "nothing that body 'b' can collide"),
         (scene(body='gravcomp="1"'), "gravcomp = 1"),
         (scene(joint='stiffness="30"'), "stiffness = 30"),
         (scene(joint='range="-1 1" limited="true"'), "limited = 1"),
