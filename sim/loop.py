@@ -17,6 +17,7 @@ from pivoting.models.reading import RigidBody, matrix, place, read_friction, tur
 from pivoting.models.scenes import compiled, instrument, load
 from pivoting.sim.attach import Attached, attach
 from pivoting.sim.control import Answers, BoundedControl, Control, LawControl, States
+from pivoting.sim.engine_log import engine_log
 from pivoting.sim.fidelity import ContactRows, read_rows
 from pivoting.sim.keys import CONTROL_KEYS
 from pivoting.sim.plan import Plan, planned
@@ -103,7 +104,8 @@ def simulate(
         control = horizons = horizon_control(case, attached, believed, follow, int(worlds), dt, steps)
     if bounds.any and not open_loop:  # a plan is within them
         control = BoundedControl(control, attached.controller, bounds, dt)
-    log = _loop(batch, control, attached.controller, truth, where, steps, progress)
+    with engine_log() as warned:
+        log = _loop(batch, control, attached.controller, truth, where, steps, progress)
     K, d = len(plan.contacts), truth.dim
     read = {key: log.sensors[..., columns] for key, columns in where.items()}
     forces = [read["contact"]] if K == 1 else [read[f"contact {i}"] for i in range(K)]
@@ -141,6 +143,7 @@ def simulate(
         plan=None if played is None else played.plan,
         plans=None if horizons is None else horizons.log,
         events=() if horizons is None else tuple(horizons.events),
+        engine_warnings=tuple(warned),
         controller="scenario" if controller is None else "given",
     )
 

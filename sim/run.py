@@ -60,6 +60,7 @@ class Run:
         wall_s: of the loop.
         plan: that was played in open loop, else None.
         plans: of a receding horizon, what came of each; else None.  events: what a user has to know of.
+        engine_warnings: what MuJoCo warned of, as of a world that diverges: each once, with its first time.
         controller: "scenario" for the scenario's own, "given" for another that was handed to `simulate`.
     """
 
@@ -94,6 +95,7 @@ class Run:
     plan: Plan | None
     plans: PlanLog | None
     events: tuple[Event, ...]
+    engine_warnings: tuple[str, ...]
     controller: str
 
     @property
@@ -243,6 +245,7 @@ class Run:
             "real_time_factor": self.worlds * float(self.time[-1]) / self.wall_s,
             "bounded_steps": int(np.count_nonzero(self.status == BOUNDED)),
             "events": [event._asdict() for event in self.events],
+            "engine_warnings": list(self.engine_warnings),
             **({} if self.plans is None else plan_figures(self.plans)),
             **({} if self.plan is None else {"plan_angle_error_max_deg": float(np.rad2deg(self.plan_error.max()))}),
         }
