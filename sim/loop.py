@@ -24,6 +24,7 @@ from pivoting.models.supports import body_size
 from pivoting.sim.attach import Attached, attach
 from pivoting.sim.contact_readings import Declared
 from pivoting.sim.control import BoundedControl, Control, LawControl
+from pivoting.sim.engine_log import engine_log
 from pivoting.sim.fidelity import ContactRows, read_rows
 from pivoting.sim.joint_drag import drag_wrench
 from pivoting.sim.keys import CONTROL_KEYS
@@ -128,7 +129,8 @@ def simulate(
         landing=case.limits.contacts_end > 0,
     )
     contacts = ContactLog(declared, where, steps, int(worlds))
-    log = run_steps(batch, control, attached.controller, contacts, truth.index, where, steps, progress)
+    with engine_log() as warned:
+        log = run_steps(batch, control, attached.controller, contacts, truth.index, where, steps, progress)
     axes = matrix(truth.table) @ space(d).force_map
     return Run(
         scenario=asked,
@@ -165,6 +167,7 @@ def simulate(
         plan=None if played is None else played.plan,
         plans=None if horizons is None else horizons.log,
         events=() if horizons is None else tuple(horizons.events),
+        engine_warnings=tuple(warned),
         controller="scenario" if controller is None else "given",
     )
 

@@ -77,6 +77,7 @@ class Run:
         wall_s: of the loop.
         plan: that was played in open loop, else None.
         plans: of a receding horizon, what came of each; else None.  events: what a user has to know of.
+        engine_warnings: what MuJoCo warned of, as of a world that diverges: each once, with its first time.
         controller: "scenario" for the scenario's own, "given" for another that was handed to `simulate`.
     """
 
@@ -114,6 +115,7 @@ class Run:
     plan: Plan | None
     plans: PlanLog | None
     events: tuple[Event, ...]
+    engine_warnings: tuple[str, ...]
     controller: str
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -304,6 +306,7 @@ class Run:
             "object": self.object,
             "contact_settings": self.contact_settings,
             "events": [event._asdict() for event in self.events],
+            "engine_warnings": list(self.engine_warnings),
             **({} if self.plans is None else plan_figures(self.plans)),
             **({} if self.plan is None else {"plan_angle_error_max_deg": float(np.rad2deg(self.plan_error.max()))}),
         }
