@@ -11,7 +11,7 @@ from pivoting.models.contact_settings import STIFF, ContactSettings
 from pivoting.models.frames import Array
 from pivoting.models.friction import contact_friction, read_friction
 from pivoting.models.naming import ModelError, body_id
-from pivoting.models.reading import FILE_FRAME, initial_data
+from pivoting.models.reading import FILE_FRAME, degrees_of_freedom, initial_data
 from pivoting.models.solver_settings import choose
 from pivoting.models.supports import can_collide, find_support
 
@@ -152,6 +152,7 @@ def load(
         part.name = part.name or f"#{part.id}"
     index = body_id(raw, body)
     name = raw.body(index).name or f"#{index}"
+    degrees_of_freedom(raw, index)
     ground = find_support(raw, initial_data(raw), index, support)
     own, table = spec.body(name), spec.geom(raw.geom(ground).name or f"#{ground}")
     spec.compiler.fusestatic = bool(own.joints)  # what hangs on it rigidly is part of it

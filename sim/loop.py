@@ -17,6 +17,7 @@ from pivoting.models.candidates import NEAR
 from pivoting.models.contact_settings import contact_settings
 from pivoting.models.frames import matrix
 from pivoting.models.friction import read_friction
+from pivoting.models.naming import ModelError
 from pivoting.models.reading import initial_data, place, read_body, turn
 from pivoting.models.scenes import Scene, load
 from pivoting.models.sensors import instrument
@@ -24,12 +25,15 @@ from pivoting.models.supports import body_size
 from pivoting.sim.attach import Attached, attach
 from pivoting.sim.contact_readings import Declared
 from pivoting.sim.control import BoundedControl, Control, LawControl
+from pivoting.sim.engine_log import engine_log
 from pivoting.sim.fidelity import ContactRows, read_rows
+from pivoting.sim.joint_drag import drag_wrench
 from pivoting.sim.keys import CONTROL_KEYS
 from pivoting.sim.plan import Plan, planned, transplanted
 from pivoting.sim.planning import horizon_control, play_control
 from pivoting.sim.run import Run, frozen
-from pivoting.sim.scenario import Scenario, scenario
+from pivoting.sim.scenario import Scenario
+from pivoting.sim.shipped import scenario
 from pivoting.sim.stepping import ContactLog, run_steps
 from pivoting.sim.strays import contact_margin, refuse_strays
 
@@ -72,19 +76,21 @@ def simulate(
     for key, value, least in (("worlds", worlds, 1), ("seed", seed, 0)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
             raise fail(key, value, f"a whole number >= {least}")
-    if case.gravity == 0.0 and case.f_min == 0.0:
-        raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the corner on the table")
     scene = load(case.path, body=case.body, support=case.support, chosen=case.chosen)
     attached, believed = believe(case, controller, scene)
+    asked, case = case, case.absolute(believed.load)
     world = scene.changed(case.actual)
     model, where = _instrumented(world)
     truth = read_body(model, world.body, world.support)
     plan = transplanted(believed, model, truth, world.scale / scene.changed(case.believed).scale)
     dt = float(model.opt.timestep)
     steps = round(case.duration / dt)
-    if steps < 2 or steps * worlds > MAX_STEPS:
-        allowed = f"such that {worlds} worlds take 2 to {MAX_STEPS} steps together, at dt = {dt:g} s"
-        raise fail("seconds", case.duration, allowed)
+    if not 2 <= steps <= MAX_STEPS:
+        raise fail("seconds", case.duration, f"such that a world takes 2 to {MAX_STEPS} steps, at dt = {dt:g} s")
+    if steps * worlds > MAX_STEPS:
+        raise fail(
+            "worlds", worlds, f"at most {MAX_STEPS // steps}: of {steps} steps each, more are not kept in memory"
+        )
     if steps * dt <= case.limits.settle_s:
         raise fail("seconds", case.duration, f"more than the {case.limits.settle_s:g} s that the verdict lets settle")
     time: Array = dt * np.arange(steps + 1, dtype=float)
@@ -107,8 +113,11 @@ def simulate(
         values.flags.writeable = False
 
     bounds = case.bounds()
-    control: Control = LawControl(attached.controller, told, bounds)
+    drag = drag_wrench(attached.body, attached.controller, *told[:2])
+    control: Control = LawControl(attached.controller, told, bounds, drag)
     horizons = played = None
+    if attached.body.drag is not None and (open_loop or case.plan_hz is not None):
+        raise ModelError(f"body = {attached.body.name!r}: a plan knows no joint damping or friction; must have none")
     if open_loop:
         control = played = play_control(case, attached, believed, follow, dt, steps)
     elif case.plan_hz is not None:
@@ -124,12 +133,14 @@ def simulate(
         landing=case.limits.contacts_end > 0,
     )
     contacts = ContactLog(declared, where, steps, int(worlds))
-    log = run_steps(batch, control, attached.controller, contacts, truth.index, where, steps, progress)
+    with engine_log() as warned:
+        log = run_steps(batch, control, attached.controller, contacts, truth.index, where, steps, progress)
     axes = matrix(truth.table) @ space(d).force_map
     return Run(
-        scenario=case,
+        scenario=asked,
         seed=int(seed),
         attached=attached,
+        load=believed.load,
         replaced=world.replaced,
         settings=settings,
         model=model,
@@ -161,6 +172,7 @@ def simulate(
         plan=None if played is None else played.plan,
         plans=None if horizons is None else horizons.log,
         events=() if horizons is None else tuple(horizons.events),
+        engine_warnings=tuple(warned),
         controller="scenario" if controller is None else "given",
     )
 
@@ -223,15 +235,10 @@ def believe(
     case = replace(case, body=believed.body, support=believed.support)
     plan = planned(case, nominal)
     if controller is not None:
-        if not isinstance(controller, WrenchController):
-            raise fail("controller", controller, "a WrenchController")
-        if [contact.dim for contact in controller.contacts] != [plan.body.dim] * len(plan.contacts):
-            kind = "planar" if plan.body.dim == 2 else "spatial"
-            given = f"one with {len(controller.contacts)} contacts in dimension {controller.space.dim}"
-            raise fail("controller", given, f"of {len(plan.contacts)} {kind} contact{'s' * (len(plan.contacts) > 1)}")
-        ignored = [key for key in CONTROL_KEYS if key in case.changes]
-        if ignored:
-            raise fail(ignored[0], case.changes[ignored[0]], "left out: the controller that is given has its own")
+        _check(controller, case, plan)
+    if plan.load.force == 0.0 and (case.f_min if controller is None else controller.belief.f_min.max()) == 0.0:
+        raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the object on its support")
+    if controller is not None:
         return Attached(nominal, plan.body, controller), plan
     attached = attach(
         nominal,
@@ -241,11 +248,30 @@ def believe(
         law=case.control_law(),
         mu=case.mu,
         margin=case.margin,
-        f_min=case.f_min,
+        f_min=float(case.absolute(plan.load).f_min),
         Q_w=case.wrench_weight(plan.body.dim),
         support=case.support,
     )
     return attached, plan
+
+
+def _check(controller: WrenchController, case: Scenario, plan: Plan) -> None:
+    """Refuse a controller that is not of these contacts, or that the loop would not ask."""
+    if not isinstance(controller, WrenchController):
+        raise fail("controller", controller, "a WrenchController")
+    if [contact.dim for contact in controller.contacts] != [plan.body.dim] * len(plan.contacts):
+        kind = "planar" if plan.body.dim == 2 else "spatial"
+        given = f"one with {len(controller.contacts)} contacts in dimension {controller.space.dim}"
+        raise fail("controller", given, f"of {len(plan.contacts)} {kind} contact{'s' * (len(plan.contacts) > 1)}")
+    for name in ("problem", "jacobian"):
+        if getattr(getattr(controller, name), "__func__", None) is not getattr(WrenchController, name):
+            allowed = (
+                f"without a {name}() of its own: the compiled loop states the problems of all worlds from `belief`"
+            )
+            raise fail("controller", type(controller).__name__, allowed + ", and would never call it")
+    ignored = [key for key in CONTROL_KEYS if key in case.changes]
+    if ignored:
+        raise fail(ignored[0], case.changes[ignored[0]], "left out: the controller that is given has its own")
 
 
 Samples = tuple[Array, Array, Array]

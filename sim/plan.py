@@ -12,6 +12,7 @@ from pivoting.models.frames import matrix, quaternion
 from pivoting.models.naming import ModelError, label
 from pivoting.models.reading import RigidBody, file_frame, initial_data, read_body
 from pivoting.sim.keys import LOWEST
+from pivoting.sim.relative import Load, load
 from pivoting.sim.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -40,6 +41,12 @@ class Plan:
     start: Array
     range: tuple[float, float]
     face: Array
+
+    @property
+    def load(self) -> Load:
+        """What values of the scenario may be relative to."""
+        points = np.array([self.body.point(contact) for contact in self.contacts])
+        return load(self.body.mass, self.body.gravity, points, self.radius)
 
 
 def planned(case: Scenario, model: mujoco.MjModel) -> Plan:

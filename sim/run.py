@@ -20,9 +20,10 @@ from pivoting.sim.contact_readings import ContactReadings, Declared
 from pivoting.sim.control import BOUNDED, Event, PlanLog, plan_figures
 from pivoting.sim.fidelity import ContactRows
 from pivoting.sim.monitor import Measures, measure
+from pivoting.sim.relative import Load
 from pivoting.sim.scenario import Scenario
 from pivoting.sim.strays import stray_words
-from pivoting.sim.verdict import Check, Limits, judge
+from pivoting.sim.verdict import Check, Limits, judge, worst_world
 
 Array = NDArray[np.float64]
 _CHOSEN = ("contacts", "coupling", "reason")  # of the contact settings, what the model itself does not say
@@ -34,6 +35,14 @@ def frozen(values: Array) -> Array:
     return values
 
 
+def _freeze(values: Any) -> None:
+    if isinstance(values, np.ndarray):
+        values.flags.writeable = False
+    elif isinstance(values, tuple):
+        for value in values:
+            _freeze(value)
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """A closed-loop run, W worlds and N steps. States have N + 1 entries, answers N; all read-only.
@@ -42,6 +51,7 @@ class Run:
         scenario: what was run, overrides included.
         seed: of the worlds' initial errors.
         attached: the controller and what it believes.
+        load: what the scenario's relative values are relative to.
         model: the world's, with the sensors of the loop.  truth: the body as that has it.
         replaced: what of the file gave way to the settings of the shipped scenes: name, and what it was.
         settings: contact parameters that were chosen for the object, if they were.
@@ -70,12 +80,14 @@ class Run:
         wall_s: of the loop.
         plan: that was played in open loop, else None.
         plans: of a receding horizon, what came of each; else None.  events: what a user has to know of.
+        engine_warnings: what MuJoCo warned of, as of a world that diverges: each once, with its first time.
         controller: "scenario" for the scenario's own, "given" for another that was handed to `simulate`.
     """
 
     scenario: Scenario
     seed: int
     attached: Attached
+    load: Load
     model: mujoco.MjModel
     truth: RigidBody
     replaced: tuple[tuple[str, str], ...]
@@ -107,7 +119,13 @@ class Run:
     plan: Plan | None
     plans: PlanLog | None
     events: tuple[Event, ...]
+    engine_warnings: tuple[str, ...]
     controller: str
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """From pickle, which forgets that arrays are read-only."""
+        vars(self).update(state)
+        _freeze(tuple(state.values()))
 
     @property
     def points(self) -> Array:
@@ -252,6 +270,11 @@ class Run:
         """Indices of the worlds that fail any check."""
         return np.flatnonzero(np.any([check.failed for check in self.checks], axis=0))
 
+    @cached_property
+    def worst_world(self) -> int:
+        """The one in which a measured value is the greatest multiple of its limit."""
+        return worst_world(self)
+
     @property
     def verdict(self) -> str:
         """ "pass" if every world is within every limit of the scenario, else "fail"."""
@@ -267,12 +290,14 @@ class Run:
             "contacts": self.points.tolist(),
             "radius": self.radius.tolist(),
             "changes": self.scenario.changes,
+            "resolved": self.scenario.resolved(self.load),
             "limits": asdict(self.limits),
             "controller": self.controller,
             "seed": self.seed,
             "worlds": self.worlds,
             "verdict": self.verdict,
             "failed_worlds": self.failed_worlds.tolist(),
+            "worst_world": self.worst_world,
             **worst,
             "solve_us_median": float(np.median(self.control_us)),
             "solve_us_p99": float(np.quantile(self.control_us, 0.99)),
@@ -285,6 +310,7 @@ class Run:
             "object": self.object,
             "contact_settings": self.contact_settings,
             "events": [event._asdict() for event in self.events],
+            "engine_warnings": list(self.engine_warnings),
             **({} if self.plans is None else plan_figures(self.plans)),
             **({} if self.plan is None else {"plan_angle_error_max_deg": float(np.rad2deg(self.plan_error.max()))}),
         }
