@@ -1,10 +1,10 @@
 """How soft the chosen contacts are: as in settings.xml, or softer where many contacts hold one body at once.
 
 MuJoCo makes each contact as soft as is right for it alone: R = (1 - d) / d D, with D the body's own inverse mass. What
-n contacts of a body have together is the inverse inertia A = J M^-1 J' between all of them, and where that is `coupling`
-times D, they move as one contact of d = coupling / (coupling + (1 - d) / d) would. A step of the normal rows is stable
-only while d (2 b h + k h^2) < 4. So (1 - d) / d grows with the coupling, and timeconst and dampratio with it, so that
-b, k and that d stay those of settings.xml: docs/fidelity.md derives and measures it.
+the contacts of a body have together is the inverse inertia A = J M^-1 J' between all of them. Where an eigenvalue of it
+is c D, they give way there by the share c / (c + (1 - d) / d) of their reference, and a step of that is stable only
+while share (2 b h + k h^2) < 4. So (1 - d) / d grows with the greatest c, the `coupling`, and timeconst and dampratio
+with it, such that b, k and the share stay those of settings.xml: docs/fidelity.md derives and measures it.
 """
 
 from collections.abc import Iterable
@@ -89,13 +89,13 @@ def _inverse_inertia(model: mujoco.MjModel, data: mujoco.MjData, body: int, supp
 
 
 def _normal_coupling(A: Array, impratio: float) -> float:
-    """Greatest eigenvalue of the normal rows' part of A (3 n, 3 n) with friction rows that are softened to 1 / impratio.
+    """Greatest eigenvalue of A (3 n, 3 n) among the normal rows, while the friction rows hold: the Schur complement.
 
-    What friction holds does not move with the normals: the Schur complement.
+    Those are softened, too, by 1 / impratio.
     """
     if not len(A):
         return 0.0
     normal = np.arange(len(A)) % 3 == 0
-    held = A[~normal][:, ~normal] + np.eye(np.count_nonzero(~normal)) / impratio
+    held = A[~normal][:, ~normal] + np.diag(np.full(2 * len(A) // 3, 1.0 / impratio))
     across = A[normal][:, ~normal]
     return float(np.linalg.eigvalsh(A[normal][:, normal] - across @ np.linalg.solve(held, across.T))[-1])

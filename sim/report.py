@@ -58,8 +58,9 @@ def print_run(console: Console, run: Run) -> None:
             "[green]pass[/]" if check.passed else "[red]FAIL[/]",
         )
         if check.name == "slip_max_m":
-            floor = 1e3 * summary["slip_floor_m"]
-            table.add_row("  of which the simulator's own, predicted", f"{_short(floor)} mm", "", "", style="dim")
+            floor, unknown = 1e3 * summary["slip_floor_m"], summary["slip_floor_unknown"]
+            told = f"unknown: {unknown}" if unknown else f"{_short(floor)} mm"
+            table.add_row("  of which the simulator's own, predicted", told, "", "", style="dim")
     console.print(table)
     failed = run.failed_worlds.size
     console.print(

@@ -18,8 +18,8 @@ from pivoting.models.reading import RigidBody
 from pivoting.sim.attach import Attached
 from pivoting.sim.contact_readings import ContactReadings, Declared
 from pivoting.sim.control import BOUNDED, Event, PlanLog, plan_figures
-from pivoting.sim.fidelity import ContactRows
-from pivoting.sim.monitor import Measures, measure
+from pivoting.sim.fidelity import ContactRows, Held, stepped_point
+from pivoting.sim.monitor import Measures, measure, slip_floor_unknown
 from pivoting.sim.relative import Load
 from pivoting.sim.scenario import Scenario
 from pivoting.sim.strays import stray_words
@@ -60,7 +60,7 @@ class Run:
         face: (P, 3) likewise, the corners of the face that the object lies on at angle 0.
         turn: the axis (3,) [world axes] and the orientation (4,) at angle 0 that `theta` is counted from.
         mu_world: the world's friction.
-        contact_rows: MuJoCo's contact at the start, for the predicted slip.
+        contact_rows: MuJoCo's contacts with the support, for the predicted slip.
         start: qpos (W, nq) and qvel (W, nv) of the worlds at time 0, from which the applied wrenches replay the run.
         time: (N+1,) [s].
         reference: desired angle, rate and acceleration, each (N+1,) [rad, s].
@@ -73,7 +73,7 @@ class Run:
         wrench_world: (W, N, 6) applied force and torque at the CoM, world axes.
         force: (W, N, K, d) contact forces (f_t, f_n) or (f_t, f_o, f_n) predicted by the solution, table axes [N].
         force_measured: (W, N, K, d) by MuJoCo's contacts, likewise.
-        contacts: what else they say, see `ContactReadings`.
+        contacts: what else they say, see `ContactReadings`; held: what their rows do, see `Held`.
         residual: (W, N) relative KKT residuals.
         status: (W, N) codes of `solution.STATUS`; 0 is solved, 3 as far as the bounds allowed.
         control_us: (N,) time to state, solve and certify the problem of one world [microseconds].
@@ -112,6 +112,7 @@ class Run:
     force: Array
     force_measured: Array
     contacts: ContactReadings
+    held: Held
     residual: Array
     status: NDArray[np.int8]
     control_us: Array
@@ -192,6 +193,12 @@ class Run:
     def lever(self) -> Array:
         """(W, N+1, K, 3) from the CoM to where the contacts touch, table axes [m]."""
         return frozen(self.turning - self._up)
+
+    @cached_property
+    def stepped(self) -> Array:
+        """(W, N+1, 3) from the CoM to the point of the body whose velocity MuJoCo steps, table axes [m]."""
+        point = stepped_point(self.model, self.truth.index) - self.truth.com
+        return frozen(self._from_com(point[None] @ matrix(self.truth.axes))[..., 0, :])
 
     @cached_property
     def corner(self) -> Array:
@@ -299,6 +306,7 @@ class Run:
             "failed_worlds": self.failed_worlds.tolist(),
             "worst_world": self.worst_world,
             **worst,
+            "slip_floor_unknown": slip_floor_unknown(self) or None,
             "solve_us_median": float(np.median(self.control_us)),
             "solve_us_p99": float(np.quantile(self.control_us, 0.99)),
             "sim_s": float(self.time[-1]),
