@@ -1,6 +1,6 @@
 """A closed-loop run, from a scenario to what is measured: the world, the belief, the start, the steps."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product, space
 from pivoting.controller.validate import fail
 from pivoting.models.candidates import NEAR
+from pivoting.models.contact_settings import contact_settings
 from pivoting.models.frames import matrix
 from pivoting.models.friction import read_friction
 from pivoting.models.naming import ModelError
@@ -38,6 +39,7 @@ from pivoting.sim.strays import contact_margin, refuse_strays
 
 Array = NDArray[np.float64]
 START_DEPTH = 1e-6  # of the lever from contact to CoM: there is contact from the first step on
+PRESSED, SAMPLES = 1e-3, 17  # levers that it is pressed in, and where along its way, to see what it touches with
 MAX_STEPS = 10_000_000  # worlds times steps that are kept in memory, about 0.5 kB each
 
 
@@ -78,10 +80,7 @@ def simulate(
     attached, believed = believe(case, controller, scene)
     asked, case = case, case.absolute(believed.load)
     world = scene.changed(case.actual)
-    model, where = instrument(world)
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that diverges is seen, not reset
-    # bodies of several geoms: a plane's bounding box is 5e9 m deep there, and misses contacts of less than 1e-6 m
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+    model, where = _instrumented(world)
     truth = read_body(model, world.body, world.support)
     plan = transplanted(believed, model, truth, world.scale / scene.changed(case.believed).scale)
     dt = float(model.opt.timestep)
@@ -100,6 +99,11 @@ def simulate(
     told, follow = _desired(case, believed, time)[1:]
     for values in (time, *reference, *desired):
         values.flags.writeable = False
+    settings = None
+    if case.chosen and not {"timeconst", "impedance"} & set(case.actual):
+        poses = desired[0][np.linspace(0, steps, SAMPLES).astype(int)]
+        settings = contact_settings(model, truth.index, truth.support, _pressed(model, plan, poses), dt)
+        model, where = _instrumented(world.with_contacts(settings))
 
     batch = Batch(model, int(worlds), nthread=1 if worlds == 1 else 0, persistent=True)
     errors = np.deg2rad(case.spread) * np.random.default_rng(seed).uniform(-1.0, 1.0, int(worlds))
@@ -138,6 +142,7 @@ def simulate(
         attached=attached,
         load=believed.load,
         replaced=world.replaced,
+        settings=settings,
         model=model,
         truth=truth,
         declared=declared,
@@ -170,6 +175,24 @@ def simulate(
         engine_warnings=tuple(warned),
         controller="scenario" if controller is None else "given",
     )
+
+
+def _instrumented(world: Scene) -> tuple[mujoco.MjModel, dict[str, slice]]:
+    """The model that is simulated, and where each reading is in its sensordata."""
+    model, where = instrument(world)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that diverges is seen, not reset
+    # bodies of several geoms: a plane's bounding box is 5e9 m deep there, and misses contacts of less than 1e-6 m
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+    return model, where
+
+
+def _pressed(model: mujoco.MjModel, plan: Plan, orientations: Array) -> Iterator[Array]:
+    """The qpos of the object pressed on its contact at each of these orientations (S, 4)."""
+    data, up, point = initial_data(model), matrix(plan.body.table)[:, 2], plan.contacts[0]
+    lever = float(np.linalg.norm(plan.body.com - point) + plan.radius[0])
+    for orientation in orientations:
+        place(model, data, plan.body, orientation, point, plan.at + (plan.radius[0] - PRESSED * lever) * up)
+        yield np.array(data.qpos)
 
 
 def _start(

@@ -11,6 +11,7 @@ from pivoting.controller.plan import Plan
 from pivoting.controller.so3 import rotated
 from pivoting.controller.space import CONJUGATE, Space, quaternion_product, space
 from pivoting.controller.units import lever
+from pivoting.models.contact_settings import ContactSettings
 from pivoting.models.frames import matrix
 from pivoting.models.naming import label
 from pivoting.models.reading import RigidBody
@@ -26,6 +27,7 @@ from pivoting.sim.strays import stray_words
 from pivoting.sim.verdict import Check, Limits, judge, worst_world
 
 Array = NDArray[np.float64]
+_CHOSEN = ("contacts", "coupling", "reason")  # of the contact settings, what the model itself does not say
 
 
 def frozen(values: Array) -> Array:
@@ -53,6 +55,7 @@ class Run:
         load: what the scenario's relative values are relative to.
         model: the world's, with the sensors of the loop.  truth: the body as that has it.
         replaced: what of the file gave way to the settings of the shipped scenes: name, and what it was.
+        settings: contact parameters that were chosen for the object, if they were.
         declared: the contacts that are to stick, as the world has them.
         radius: (K,) of what rolls, else 0 [m].
         face: (P, 3) likewise, the corners of the face that the object lies on at angle 0.
@@ -89,6 +92,7 @@ class Run:
     model: mujoco.MjModel
     truth: RigidBody
     replaced: tuple[tuple[str, str], ...]
+    settings: ContactSettings | None
     declared: Declared
     radius: Array
     face: Array
@@ -341,6 +345,7 @@ class Run:
             "impratio": float(opt.impratio),
             "cone": mujoco.mjtCone(int(opt.cone)).name.removeprefix("mjCONE_").lower(),
             "replaced": dict(self.replaced),
+            **({} if self.settings is None else {key: getattr(self.settings, key) for key in _CHOSEN}),
         }
 
     @cached_property
