@@ -11,8 +11,9 @@ from itertools import chain
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
+from pivoting.models.frames import Array, matrix
 from pivoting.models.hull import TOLERANCE, Hull, Indices, circle, outline, read_hull
-from pivoting.models.reading import Array, ModelError, matrix
+from pivoting.models.naming import ModelError
 
 NEAR = 1e-3  # of the body's size: a contact given by hand is a corner if it is closer to it
 LEAST = 1e-3  # [rad]: a range of less is none

@@ -12,7 +12,8 @@ from itertools import product
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.models.reading import Array, ModelError, matrix
+from pivoting.models.frames import Array, matrix
+from pivoting.models.naming import ModelError
 from scipy.spatial import ConvexHull, QhullError
 
 Indices = NDArray[np.int64]

@@ -1,14 +1,16 @@
 """Where a scenario's object stands and about what it turns: contacts, axis, and the orientation at angle 0."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product
-from pivoting.models.candidates import Stance, planar_stance, stance, support_points
-from pivoting.models.reading import ModelError, RigidBody, matrix, quaternion, read_body
+from pivoting.models.candidates import NEAR, planar_stance, stance, support_points
+from pivoting.models.frames import matrix, quaternion
+from pivoting.models.naming import ModelError, label
+from pivoting.models.reading import RigidBody, file_frame, initial_data, read_body
 from pivoting.sim.keys import LOWEST
 from pivoting.sim.scenario import Scenario
 
@@ -41,24 +43,50 @@ class Plan:
 
 
 def planned(case: Scenario, model: mujoco.MjModel) -> Plan:
-    """The scenario's plan on its compiled model.
+    """The scenario's plan on its compiled model, as the controller believes it.
 
     Raises:
         ModelError: the model cannot be served, or the object cannot be pivoted on that contact; with the reason.
     """
     body = read_body(model, case.body, case.support)
-    table = matrix(body.table)
-    gap = np.deg2rad(LOWEST)
-    if body.dim == 2:
-        return _planar(case, model, body)
-    data = mujoco.MjData(model)
-    if model.nkey:
-        mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_kinematics(model, data)
+    found = _planar(case, model, body) if body.dim == 2 else _spatial(case, model, body)
+    over = float(body.surface.beyond(found.at).max())
+    if over > NEAR * float(np.linalg.norm(found.contacts[0] - body.com)):
+        told = f"the contact would be {over:.3g} m beside its upper face"
+        raise ModelError(f"support = {label(model, body.support)}: {told}; must be under the body")
+    return found
+
+
+def transplanted(plan: Plan, model: mujoco.MjModel, body: RigidBody, grown: float) -> Plan:
+    """A plan in a world that is not as believed: the same contacts, of an object that may be larger, on a table that
+    may be inclined otherwise.
+
+    Args:
+        plan: as believed.  model, body: the world.
+        grown: how many times as large the object is there.
+    """
+    turned = matrix(body.table) @ matrix(plan.body.table).T
+    middle = model.geom_pos[model.body_geomadr[body.index]]  # of the one box that a size may change
+    return replace(
+        plan,
+        body=body,
+        contacts=middle + grown * (plan.contacts - middle) if grown != 1.0 else plan.contacts,
+        face=middle + grown * (plan.face - middle) if grown != 1.0 else plan.face,
+        at=body.origin + turned @ (plan.at - plan.body.origin),
+        axis=turned @ plan.axis,
+        start=quaternion(turned @ matrix(plan.start)),
+    )
+
+
+def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
+    """In space the contacts are found on the object, as `models.candidates.stance` does."""
+    table, gap = matrix(body.table), np.deg2rad(LOWEST)
+    data = initial_data(model)
     now = data.xmat[body.index].reshape(3, 3)
-    found = stance(model, body.index, case.contact, quaternion(now), body.table)
-    if not isinstance(case.contact, str):
-        _refuse_above(model, body, found, table.T @ now)
+    contact = case.contact
+    if not isinstance(contact, str):
+        contact = _in_body_frame(contact, file_frame(model, body.index))
+    found = stance(model, body.index, contact, quaternion(now), body.table)
     start, axis = table @ found.rotation, table @ found.axis
     low, high = found.range
     lands = case.limits.contacts_end > 0
@@ -73,6 +101,15 @@ def planned(case: Scenario, model: mujoco.MjModel) -> Plan:
     return Plan(body, found.points, found.radius, at, axis, quaternion(start), limits, face)
 
 
+def _in_body_frame(points: ArrayLike, frame: tuple[Array, Array]) -> ArrayLike:
+    """Points (..., 3) that are given in the frame that the file gives the body; anything else as it is."""
+    given = np.asarray(points)
+    if given.dtype.kind not in "iuf" or given.shape[-1:] != (3,):
+        return points
+    origin, axes = frame
+    return origin + given @ axes.T
+
+
 def _planar(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
     """In the plane the contact is the left end of the face that is down at theta = 0, unless it is given."""
     axes, table, gap = matrix(body.axes), matrix(body.table), np.deg2rad(LOWEST)
@@ -80,14 +117,3 @@ def _planar(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
     face = point - radius * axes[:, 2]
     limits = (gap, most - gap)
     return Plan(body, point[None], np.array([radius]), body.origin, -table[:, 1], body.table, limits, face[None])
-
-
-def _refuse_above(model: mujoco.MjModel, body: RigidBody, found: Stance, now: Array) -> None:
-    """Points that are given have to be the lowest of the body as its file has it, body to table axes `now` (3, 3)."""
-    lowest = support_points(model, body.index, -now[2])[0] @ now[2]
-    height = (found.points @ now[2] - found.radius).max() - lowest
-    if height > 1e-3 * (np.linalg.norm(found.points - body.com, axis=-1) + found.radius).max():
-        raise ModelError(
-            f"contact = {found.points.tolist()}: as the file has the body, this is {height:.3g} m above the table that "
-            'its lowest point could stand on; must be among its lowest, or "vertex", "edge", "lowest"'
-        )

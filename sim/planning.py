@@ -10,7 +10,7 @@ from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product
 from pivoting.controller.validate import fail
 from pivoting.models.candidates import contact_points
-from pivoting.models.reading import matrix
+from pivoting.models.frames import matrix
 from pivoting.sim.attach import Attached
 from pivoting.sim.control import HorizonControl, PlayControl
 from pivoting.sim.plan import Plan

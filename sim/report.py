@@ -18,6 +18,8 @@ _LINES = {
     "angle_error_rms_deg": ("angle error, RMS", 1.0, "deg"),
     "angle_error_max_deg": ("angle error, greatest", 1.0, "deg"),
     "contact_lost_s": ("time without contact", 1.0, "s"),
+    "undeclared_contact_s": ("time with an undeclared contact", 1.0, "s"),
+    "penetration_rel": ("depth that the contact does not explain", 100.0, "% of the lever"),
     "friction_use_max": ("friction used, |f_t| / (mu f_n)", 1.0, ""),
     "force_mismatch_rel": ("contact force, predicted against measured", 100.0, "%"),
     "contacts_missing": ("contacts missing at the end", 1.0, ""),

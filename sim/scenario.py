@@ -238,7 +238,7 @@ def own_object(
         theta=5.0,
         theta_end=25.0,
         seconds=2.0,
-        limits=Limits(slip_m=5e-4, angle_rms_deg=0.1, angle_max_deg=0.2, force_mismatch_rel=0.05, settle_s=0.1),
+        limits=Limits(slip_m=None, angle_rms_deg=0.1, angle_max_deg=0.2, force_mismatch_rel=0.05, settle_s=0.1),
     )
 
 
