@@ -13,9 +13,10 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 from pivoting.models.faces import SLACK, Face, bends, cones, face, faces, middle, promising
+from pivoting.models.frames import Array, matrix
 from pivoting.models.given import ALLOWED, Shown, as_compiled, held_by_hand, written
 from pivoting.models.hull import TOLERANCE, Hull, Indices, read_hull
-from pivoting.models.reading import Array, ModelError, matrix
+from pivoting.models.naming import ModelError
 from pivoting.models.refusal import named, no_contact, not_held, option, out_of_range, within
 from pivoting.models.tilt import LEAST, Arc, Held, Stance, interval, tilted, tilted_aside
 
@@ -288,9 +289,7 @@ def _aside(body: Hull, on: Face, least: float, now: Array | None = None) -> Iter
             yield one
 
 
-def _of_no_face(
-    body: Hull, kind: str, least: float, of: Indices | None = None
-) -> Iterator[tuple[Held, Array]]:
+def _of_no_face(body: Hull, kind: str, least: float, of: Indices | None = None) -> Iterator[tuple[Held, Array]]:
     """Edges or vertices of the hull, each with a normal of a table on which it stands on that alone, CoM lowest first.
 
     They are of two corners, or of a corner, ball or rim, all of them or those `of` some ellipsoids.
@@ -350,7 +349,9 @@ def _way_out(
     """The nearest contact that would do, or else the first with half the range or more, as the end of a message."""
     asked = arc or Arc(0.0, 0.0)
     for part in 0.5 ** np.arange(8):
-        less = None if arc is None else arc if part == 1.0 else Arc(0.0, part * arc.least - arc.gap, arc.gap, lands=True)
+        less = (
+            None if arc is None else arc if part == 1.0 else Arc(0.0, part * arc.least - arc.gap, arc.gap, lands=True)
+        )
         kinds = [kind for kind in ("edge", "vertex") if part < 1.0 or contact is not kind]
         some = (one for kind in kinds for one in _search(body, kind, less, now) if holds is None or holds(one))
         if isinstance(contact, str):

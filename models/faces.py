@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.models.frames import Array
 from pivoting.models.hull import Hull, Indices, outline
-from pivoting.models.reading import Array, ModelError
+from pivoting.models.naming import ModelError
 
 SLACK = 0.9  # of a range asked for: a bound is of facets that were merged within a tolerance
 
@@ -60,22 +61,20 @@ def promising(body: Hull, kind: str, least: float) -> NDArray[np.bool_]:
     The table's normals about a vertex of the hull are a cone that ends at the normals of its facets, and about an edge
     an arc between two; a hull of samples has the wider ones. All facets of what is round are promising.
     """
-    found: NDArray[np.bool_] = (body.rank[body.facets] > 0).any(axis=1)
-    if kind == "edge":
-        return found | (bends(body) >= SLACK * least).any(axis=1)
-    return found | (cones(body)[body.facets] >= SLACK * least).any(axis=1)
+    room = bends(body) if kind == "edge" else cones(body)[body.facets]
+    return np.any((body.rank[body.facets] > 0) | (room >= SLACK * least), axis=1)
 
 
 def middle(body: Hull, facets: Indices) -> Array:
     """(3,) the normal in the middle of some facets' normals."""
     total = body.ups[facets].sum(axis=0)
-    return total / max(float(np.linalg.norm(total)), 1e-300)  # type: ignore[no-any-return]
+    return total / max(float(np.linalg.norm(total)), 1e-300)
 
 
 def bends(body: Hull) -> Array:
     """(F, 3) the angle from each facet to the one across each of its edges [rad]."""
     apart = np.linalg.norm(body.ups[:, None] - body.ups[body.beside], axis=2)
-    return 2.0 * np.arcsin(np.minimum(0.5 * apart, 1.0))  # type: ignore[no-any-return]
+    return 2.0 * np.arcsin(np.minimum(0.5 * apart, 1.0))
 
 
 def cones(body: Hull) -> Array:

@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pivoting.models.frames import Array
 from pivoting.models.hull import Hull
-from pivoting.models.reading import Array, ModelError
+from pivoting.models.naming import ModelError
 from pivoting.models.tilt import Held
 
 NEAR = 1e-3  # of the body's size: a contact given by hand is a corner if it is closer to it

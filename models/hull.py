@@ -12,7 +12,8 @@ from itertools import product
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.models.reading import Array, ModelError, matrix
+from pivoting.models.frames import Array, matrix
+from pivoting.models.naming import ModelError, label
 from scipy.spatial import ConvexHull, QhullError
 
 Indices = NDArray[np.int64]
@@ -43,7 +44,7 @@ class Hull:
     Attributes:
         centre: (N, 3).  axes: (N, 3, 3) the A above.  rank: (N,) of A: 0, 2 or 3.
         radius: (N,) of a ball, else 0.
-        geom: (N,) whose each is.  label: of each geom, its name for a reader.
+        geom: (N,) whose each is.  label: of each geom, in words.
         ups: (F, 3) inward normals of the hull's facets.  facets: (F, 3) of which three ellipsoids each is.
         beside: (F, 3) the facet across from each of these, beyond the edge of the other two.
         size: the hull's diagonal.  reach: what is closer to a plane is on it.
@@ -89,7 +90,9 @@ class Hull:
         egg = found[(self.rank[found] == 3) & (self.radius[found] == 0.0)]
         rolling = [*self.geom[egg], *(geom for geom in tilted if tilted.count(geom) > 1)]
         if rolling:
-            rolls = f"its {self.label[rolling[0]]} touches the table there, and it rolls: no material point stays put"
+            rolls = (
+                f"its geom {self.label[rolling[0]]} touches the table there, and it rolls: no material point stays put"
+            )
             raise ModelError(f"body = {self.name!r}: {rolls}; must be a corner, an edge, a rim or an end of a capsule")
         rings = [self.centre[i] + SAMPLES[2][::every] @ self.axes[i].T for i in found[flat]]
         points = np.concatenate([self.lowest(up, found[~flat]), *rings])
@@ -145,12 +148,8 @@ def read_hull(model: mujoco.MjModel, index: int, tolerance: float = TOLERANCE) -
     facets = (np.cumsum(keep) - 1)[owner[hull.simplices]]
     com = np.array(model.body_ipos[index])
     ups, beside = -hull.equations[:, :3], hull.neighbors.astype(int)
-    return Hull(name, labels(model, geoms), com, *fields, ups, facets, beside, size, tolerance * size)
-
-
-def labels(model: mujoco.MjModel, geoms: Sequence[int]) -> dict[int, str]:
-    """What each geom is called in a message: by its name, or its number if it has none."""
-    return {i: f"geom {model.geom(i).name!r}" if model.geom(i).name else f"geom {i}" for i in geoms}
+    labels = {geom: label(model, geom) for geom in geoms}
+    return Hull(name, labels, com, *fields, ups, facets, beside, size, tolerance * size)
 
 
 def colliding(model: mujoco.MjModel, index: int) -> list[int]:

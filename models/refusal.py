@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pivoting.models.frames import Array
 from pivoting.models.given import ALLOWED, Shown, as_compiled, written
 from pivoting.models.hull import Hull
-from pivoting.models.reading import Array
 from pivoting.models.tilt import Arc, Held, Stance, next_touch
 
 
@@ -48,9 +48,10 @@ def out_of_range(
     wanted = sorted((arc.theta, arc.theta_end))
     point, which = next_touch(body, held, up(0.0 if wanted[0] < low <= wanted[1] <= high else most))
     kind = "corner" if body.rank[which] == 0 else "point"
-    asked = f"theta = {np.rad2deg(arc.theta):g} and theta_end = {np.rad2deg(arc.theta_end):g} deg"
+    end = f" and theta_end = {np.rad2deg(arc.theta_end):g}" * (arc.theta_end != arc.theta)
+    asked = f"theta = {np.rad2deg(arc.theta):g}{end} deg"
     about = f"about {written(held.points, shown)} " * isinstance(contact, str)
-    touches = f"then the {kind} {written(point, shown)} of {body.label[int(body.geom[which])]} touches the table"
+    touches = f"then the {kind} {written(point, shown)} of geom {body.label[int(body.geom[which])]} touches the table"
     return f"{named(contact, shown)}: {asked}: {about}it can be turned within {within(arc, most)}, {touches}"
 
 
@@ -65,5 +66,7 @@ def not_held(body: Hull, contact: str | ArrayLike, edge: Stance, shown: Shown = 
     """That the simulator does not hold an edge."""
     length = float(np.linalg.norm(edge.points[1] - edge.points[0]))
     whose = body.label[int(body.geom[edge.owner[0]])]
-    what = f"the edge {written(edge.points, shown)} of {whose}, {length:.3g} m long, is held by one contact at a time"
+    what = (
+        f"the edge {written(edge.points, shown)} of geom {whose}, {length:.3g} m long, is held by one contact at a time"
+    )
     return f"{named(contact, shown)}: {what}, as MuJoCo makes few of a mesh, and none close to another"

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.models.frames import Array
 from pivoting.models.hull import Hull, Indices, circle
-from pivoting.models.reading import Array
 
 LEAST = 1e-3  # [rad]: a range of less is none
 LARGE = 1000  # ellipsoids: of larger hulls only the neighbours are asked, which by convexity are the first to touch
@@ -89,7 +89,7 @@ class Stance:
     def up(self, theta: float) -> Array:
         """(3,) the table's normal at an angle [rad], body frame."""
         lifted = np.cross(self.axis, [0.0, 0.0, 1.0])
-        return (np.cos(theta) * np.array([0.0, 0.0, 1.0]) - np.sin(theta) * lifted) @ self.rotation  # type: ignore[no-any-return]
+        return (np.cos(theta) * np.array([0.0, 0.0, 1.0]) - np.sin(theta) * lifted) @ self.rotation
 
 
 def tilted(body: Hull, held: Held, up: Array, now: Array | None = None, inward: Array | None = None) -> Stance | None:
@@ -170,7 +170,7 @@ def _inward(body: Hull, held: Held, up: Array) -> Array:
     inward = inward - (inward @ up) * up
     if np.linalg.norm(inward) <= body.reach:  # balanced
         inward = np.cross(np.eye(3)[np.abs(up).argmin()], up)
-    return inward / np.linalg.norm(inward)  # type: ignore[no-any-return]
+    return inward / np.linalg.norm(inward)
 
 
 def _rim(body: Hull, held: Held) -> Indices:
@@ -188,17 +188,17 @@ def _others(body: Hull, held: Held) -> Indices:
 
 
 def _between(held: Held, points: Array, reach: float) -> NDArray[np.bool_]:
-    """(...,) which of some points (..., 3) are within `reach` of the contact's point, or of the edge between its two."""
+    """(...,) which of some points (..., 3) are within `reach` of the contact's point, or of the edge."""
     away, along = points - held.points[0], held.points[-1] - held.points[0]
     share = np.clip(away @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
-    return np.linalg.norm(away - share[..., None] * along, axis=-1) <= reach  # type: ignore[no-any-return]
+    return np.linalg.norm(away - share[..., None] * along, axis=-1) <= reach
 
 
 def _interval(body: Hull, held: Held, up: Array, inward: Array) -> tuple[Array, Array]:
     """(D,) and (D,): the same for each of `inward` (D, 3).
 
-    At theta the table's normal is n = cos(theta) up + sin(theta) inward. A corner, c from the axis, is above it for half
-    a turn; an ellipsoid while n.c > |A'n|: a cone of n in the plane of both, about an eigenvector of c c' - A A'.
+    At theta the table's normal is n = cos(theta) up + sin(theta) inward. A corner, c from the axis, is above it for
+    half a turn; an ellipsoid while n.c > |A'n|: a cone of n in the plane of both, about an eigenvector of c c' - A A'.
     """
     if held.radius > 0.0:
         return _rolling(body, held, up, inward)

@@ -1,5 +1,6 @@
 """The notes' second figure as a picture: wrench space with the cone and the optimum, and the forces that it weighs."""
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +11,13 @@ from pivoting.controller.solution_space import solution_space
 ORANGE, BLUE, BLACK, RED, GREEN = "#e08a1e", "#2f6db3", "#222222", "#c0392b", "#2e8b57"
 
 
-def draw_solution_space(solution: Solution, path: Path, title: str = "") -> Path:
+def draw_solution_space(solution: Solution, path: str | os.PathLike[str], title: str = "") -> Path:
     """Draw a solved planar problem with one contact; written whole or not at all, in the format of the file's ending.
 
     Left: wrench space (object axes). Orange, what the contact can do, J f; blue, the applied wrenches that balance,
     required - J f. Right: the same problem in the contact force alone, with level sets of its cost.
     """
+    path = Path(path)
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from pivoting.sim.run import Run
 
 Array = NDArray[np.float64]
+LIFTED = 1e-4  # of the lever: a contact that has risen by more has left the table
 BOUNDED = STATUS.index("bounded")
 
 
@@ -23,7 +24,9 @@ class Measures:
         slip_max_m: greatest displacement of a contact along the table from where it started, less what it rolled.
         slip_floor_m: what the simulator's creep, rotation and penetration terms predict for it (`fidelity.drift`).
         angle_error_rms_deg, angle_error_max_deg: orientation against the reference.
-        contact_lost_s: time in which the contact sensor shows no push on one of the contacts.
+        contact_lost_s: time in which nothing pushes on the contacts, or one of them has left the table.
+        undeclared_contact_s: time in which the object touches something anywhere else.
+        penetration_rel: greatest depth beyond what the soft contact explains under the predicted load, in levers.
         contacts_missing: how many fewer contacts there are at the end than the scenario asks for.
         bounce_m: height that the landed face regains after the first moment with all these contacts.
         friction_use_max: measured |f_t| / (mu f_n) with the world's mu; nan if there never was a push.
@@ -37,6 +40,8 @@ class Measures:
     angle_error_rms_deg: Array
     angle_error_max_deg: Array
     contact_lost_s: Array
+    undeclared_contact_s: Array
+    penetration_rel: Array
     contacts_missing: Array
     bounce_m: Array
     friction_use_max: Array
@@ -56,7 +61,8 @@ def measure(run: "Run") -> Measures:
     measured, predicted = run.force_measured[:, counted], run.force[:, counted]
     use = run.friction_use[:, steps]
     pushed = ~np.isnan(use)
-    lost = ~pushed.all(axis=2)
+    height = run.corner[..., 2] - run.corner[:, :1, :, 2]
+    lost = ~pushed.any(axis=2) | (height > LIFTED * run.size)[:, 1:][:, steps].any(axis=2)
     mismatch = _rms(np.linalg.norm(measured - predicted, axis=-1)) / _rms(np.linalg.norm(predicted, axis=-1))
     ever = pushed.any(axis=(1, 2))
     return Measures(
@@ -65,6 +71,8 @@ def measure(run: "Run") -> Measures:
         angle_error_rms_deg=_rms(error),
         angle_error_max_deg=np.abs(error).max(axis=1),
         contact_lost_s=np.count_nonzero(lost, axis=1) * run.dt,
+        undeclared_contact_s=np.count_nonzero(run.contacts.strays > 0.0, axis=1) * run.dt,
+        penetration_rel=_penetration(run) / run.size,
         contacts_missing=np.maximum(run.scenario.limits.contacts_end - run.contacts_found[:, -1], 0.0),
         bounce_m=_bounce(run),
         friction_use_max=np.where(ever, np.where(pushed, use, 0.0).max(axis=(1, 2)), np.nan),
@@ -72,6 +80,14 @@ def measure(run: "Run") -> Measures:
         residual_max=np.where(np.isfinite(run.residual), run.residual, np.inf).max(axis=1),
         unsolved_steps=np.count_nonzero((run.status != 0) & (run.status != BOUNDED), axis=1).astype(float),
     )
+
+
+def _penetration(run: "Run") -> Array:
+    """(W,) greatest depth [m] beyond that at which the soft contact balances the predicted load."""
+    rows = run.contact_rows
+    load = run.force[..., -1].sum(axis=-1)
+    explained = 0.0 if rows is None else rows.R_n * np.nan_to_num(load) / rows.points / rows.k
+    return np.maximum(run.contacts.depth - explained, 0.0).max(axis=1)
 
 
 def _bounce(run: "Run") -> Array:

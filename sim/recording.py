@@ -30,6 +30,7 @@ from pivoting.sim.monitor import predicted_slip
 from pivoting.sim.run import Run
 from pivoting.sim.solids import arcs, cone
 
+OFF = ("off", "false", "0")  # of RERUN, as rerun reads it
 QUAD = [[0, 1, 2], [0, 2, 3]]  # triangles of four corners
 EYE = {2: (0.0, 2.05, 0.25), 3: (0.95, 1.25, 0.55)}  # from the centre to the right, towards us and up [sides]
 FINE, WIDE = 1.5, 4.0  # line widths: what was measured shows under what was predicted
@@ -56,7 +57,11 @@ COMPONENTS = {  # of w by dimension
 }
 
 
-def record(run: Run, path: Path, *, world: int = 0) -> Path:
+class RecordingOffError(RuntimeError):
+    """The environment says that nothing is to be recorded."""
+
+
+def record(run: Run, path: str | os.PathLike[str], *, world: int | None = None) -> Path:
     """Write one world of a finished run to `path` (.rrd) and return it; `rerun PATH` shows it.
 
     Views hold 200 Hz of simulated time at most, and 2,000 frames at most; the wrench space 50 Hz and 500, solved again
@@ -67,14 +72,19 @@ def record(run: Run, path: Path, *, world: int = 0) -> Path:
     Args:
         run: of `simulate`.
         path: of the file, in a folder that exists. It appears, or is replaced, when it is whole.
-        world: which one.
+        world: which one; None: the worst, see `Run.worst_world`.
 
     Raises:
         ValueError: there is no such world.
+        RecordingOffError: RERUN=off is set in the environment.
         OSError: the file cannot be written.
     """
+    path = Path(path)
+    world = run.worst_world if world is None else world
     if isinstance(world, bool) or not isinstance(world, int | np.integer) or not 0 <= world < run.worlds:
         raise fail("world", world, f"a whole number in [0, {run.worlds})")
+    if os.environ.get("RERUN", "").lower() in OFF:
+        raise RecordingOffError(f"RERUN={os.environ['RERUN']} is set in the environment")
     import rerun as rr  # takes a second
 
     partial = path.with_name(f".{path.name}.{os.getpid()}.part")

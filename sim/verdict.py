@@ -1,15 +1,18 @@
 """The verdict: explicit thresholds on what was measured, and assertions on them for anyone's tests."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.controller.validate import number
+from pivoting.controller.validate import fail, number
 
 if TYPE_CHECKING:
     from pivoting.sim.monitor import Measures
     from pivoting.sim.run import Run
+
+FALL = 0.01  # [s]
 
 
 @dataclass(frozen=True)
@@ -17,9 +20,12 @@ class Limits:
     """Thresholds of a verdict; all but the slip count after `settle_s`.
 
     Attributes:
-        slip_m: displacement of the material corner along the table [m].
+        slip_m: displacement of the material corner along the table [m]; None, whatever the unit of length: `slip_rel`
+            levers from the contact to the centre of mass, but no more than the object would fall in 10 ms (0.49 mm).
         angle_rms_deg, angle_max_deg: error of theta.
-        contact_lost_s: time in which MuJoCo's contact sensor shows no push on one of the contacts.
+        contact_lost_s: time in which nothing pushes on the contacts, or one of them has left the table.
+        undeclared_contact_s: time in which something else than these contacts touches the object.
+        penetration_rel: depth of the contact beyond what the soft contact explains, in levers.
         contacts_end: contacts with the support that there have to be at the end; 0: not asked.
         bounce_m: height that the landed face may regain, where that is asked [m].
         force_mismatch_rel: RMS of (measured - predicted contact force) over RMS of the predicted.
@@ -27,10 +33,13 @@ class Limits:
         settle_s: what the start may take [s].
     """
 
-    slip_m: float = 1e-4
+    slip_m: float | None = 1e-4
+    slip_rel: float = 0.01
     angle_rms_deg: float = 0.1
     angle_max_deg: float = 0.2
     contact_lost_s: float = 0.0
+    undeclared_contact_s: float = 0.0
+    penetration_rel: float = 0.01
     contacts_end: int = 0
     bounce_m: float = 1e-5
     force_mismatch_rel: float = 0.05
@@ -39,7 +48,33 @@ class Limits:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            number(f"limits.{name}", value, at_least=0.0)
+            if name != "slip_m" or value is not None:
+                number(f"limits.{name}", value, at_least=0.0)
+
+    def for_object(self, lever: float, gravity: float) -> "Limits":
+        """These limits for an object with a lever [m] under gravity [m/s^2]: that on its slip is a length."""
+        fall = 0.5 * gravity * FALL**2 if gravity > 0.0 else np.inf
+        return self if self.slip_m is not None else replace(self, slip_m=min(self.slip_rel * lever, fall))
+
+    def change(self, limits: "Limits | Mapping[str, float | str]") -> "Limits":
+        """These with other values, of a mapping from text if need be; or the limits that are given.
+
+        Raises:
+            ValueError: there is no such limit, or a value is not a number >= 0; it is named.
+        """
+        if isinstance(limits, Limits):
+            return limits
+        if not isinstance(limits, Mapping):
+            raise fail("limits", limits, 'Limits, or a mapping such as {"slip_m": 2e-3}')
+        new: dict[str, Any] = {}
+        for name, value in limits.items():
+            if name not in vars(self):
+                raise fail(f"limits.{name}", value, "a known limit: " + ", ".join(vars(self)))
+            try:
+                new[name] = float(value) if isinstance(value, str) else value
+            except ValueError:
+                raise fail(f"limits.{name}", value, "a number") from None
+        return replace(self, **new)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,11 +99,14 @@ class Check:
 
 def judge(measures: "Measures", limits: Limits) -> tuple[Check, ...]:
     """Every check of a run; a value that is not finite fails."""
+    assert limits.slip_m is not None, "limits are for a lever"
     pairs = {
         "slip_max_m": (measures.slip_max_m, limits.slip_m),
         "angle_error_rms_deg": (measures.angle_error_rms_deg, limits.angle_rms_deg),
         "angle_error_max_deg": (measures.angle_error_max_deg, limits.angle_max_deg),
         "contact_lost_s": (measures.contact_lost_s, limits.contact_lost_s),
+        "undeclared_contact_s": (measures.undeclared_contact_s, limits.undeclared_contact_s),
+        "penetration_rel": (measures.penetration_rel, limits.penetration_rel),
         "friction_use_max": (measures.friction_use_max, limits.friction_use),
         "force_mismatch_rel": (measures.force_mismatch_rel, limits.force_mismatch_rel),
         "unsolved_steps": (measures.unsolved_steps, 0.0),
@@ -79,6 +117,17 @@ def judge(measures: "Measures", limits: Limits) -> tuple[Check, ...]:
             "bounce_m": (measures.bounce_m, limits.bounce_m),
         }
     return tuple(Check(name, float(np.max(value)), limit, ~(value <= limit)) for name, (value, limit) in pairs.items())
+
+
+def worst_world(run: "Run") -> int:
+    """The world in which a value is the greatest multiple of its limit; what is not finite is beyond any."""
+    ratios = np.zeros(run.worlds)
+    for check in run.checks:
+        values = np.asarray(getattr(run.measures, check.name), dtype=float)
+        over = np.where(np.isfinite(values), values, np.inf)
+        over = over / check.limit if check.limit > 0.0 else np.where(over > 0.0, np.inf, 0.0)
+        ratios = np.maximum(ratios, over)
+    return int(np.argmax(ratios))
 
 
 def assert_sticking(run: "Run", *, slip_m: float | None = None, contact_lost_s: float | None = None) -> None:
@@ -92,10 +141,12 @@ def assert_sticking(run: "Run", *, slip_m: float | None = None, contact_lost_s: 
         AssertionError: it names the check, the worst world, its value, the limit, and the slip that is the simulator's
             own.
     """
-    limits = run.scenario.limits
-    over = {
+    limits = run.limits
+    over: dict[str, float | None] = {
         "slip_max_m": limits.slip_m if slip_m is None else slip_m,
         "contact_lost_s": limits.contact_lost_s if contact_lost_s is None else contact_lost_s,
+        "undeclared_contact_s": limits.undeclared_contact_s,
+        "penetration_rel": limits.penetration_rel,
         "friction_use_max": limits.friction_use,
         "force_mismatch_rel": limits.force_mismatch_rel,
     }
@@ -113,17 +164,18 @@ def assert_tracking(run: "Run", *, rms_deg: float | None = None, max_deg: float 
     Raises:
         AssertionError: it names the check, the worst world, its value and the limit.
     """
-    limits = run.scenario.limits
-    over = {
+    limits = run.limits
+    over: dict[str, float | None] = {
         "angle_error_rms_deg": limits.angle_rms_deg if rms_deg is None else rms_deg,
         "angle_error_max_deg": limits.angle_max_deg if max_deg is None else max_deg,
     }
     _assert_below(run, over, "")
 
 
-def _assert_below(run: "Run", over: dict[str, float], context: str) -> None:
+def _assert_below(run: "Run", over: dict[str, float | None], context: str) -> None:
     wrong = []
     for name, limit in over.items():
+        assert limit is not None
         values = np.atleast_1d(getattr(run.measures, name))
         if not (values <= limit).all():
             world = int(np.argmax(np.where(np.isfinite(values), values, np.inf)))
