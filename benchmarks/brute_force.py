@@ -162,7 +162,9 @@ class Body:
         s = self.surface
         if (s.kind[touching] == EGG).any():
             return True
-        rims = {piece: np.count_nonzero(s.piece[touching] == piece) for piece in s.piece[touching[s.kind[touching] == RIM]]}
+        rims = {
+            piece: np.count_nonzero(s.piece[touching] == piece) for piece in s.piece[touching[s.kind[touching] == RIM]]
+        }
         tilted = [int(s.geom[s.piece == piece][0]) for piece, count in rims.items() if count < SAMPLES // 2]
         return len(tilted) != len(set(tilted))
 

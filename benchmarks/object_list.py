@@ -55,7 +55,10 @@ PACKAGES = {
     "gym-hil==0.1.14": ("gym_hil/**/*.xml",),
     "gym-xarm==0.1.1": ("gym_xarm/**/*.xml",),
 }
-SOLID = {int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}")) for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")}
+SOLID = {
+    int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"))
+    for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")
+}
 FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 
 
@@ -151,7 +154,9 @@ def scene(thing: Thing) -> Path:
         model = theirs.compile()
         for assets, folder in ((theirs.meshes, theirs.meshdir), (theirs.textures, theirs.texturedir)):
             for asset in assets:  # a written file has one folder for all of its parts
-                asset.file = asset.file and str(Path(folder) / (Path(asset.file).name if theirs.strippath else asset.file))
+                asset.file = asset.file and str(
+                    Path(folder) / (Path(asset.file).name if theirs.strippath else asset.file)
+                )
         theirs.meshdir = theirs.texturedir = ""
         if thing.body:
             index = int(thing.body[1:]) if thing.body.startswith("#") else model.body(thing.body).id
@@ -207,7 +212,9 @@ def shape(path: Path) -> tuple[Any, ...]:
     """What copies have in common: mass, inertia and extent, to three digits, and the colliding geoms' types."""
     model = mujoco.MjModel.from_xml_path(str(path))
     points = surface(model, 1)
-    extent = np.ptp(np.concatenate([points.points + points.radius[:, None], points.points - points.radius[:, None]]), axis=0)
+    extent = np.ptp(
+        np.concatenate([points.points + points.radius[:, None], points.points - points.radius[:, None]]), axis=0
+    )
     numbers = [model.body_subtreemass[1], *np.sort(model.body_inertia[1]), *np.sort(extent)]
     return (*(f"{x:.2e}" for x in numbers), *sorted(model.geom_type[1:].tolist()))
 

@@ -184,7 +184,7 @@ def _remedies(case: _Case) -> Iterator[Remedy]:
 
 
 def _floors(case: _Case) -> Iterator[float]:
-    """[N] floors of each contact, the least first: against opening by turning, errors of the force, or of the weight."""
+    """[N] floors of each contact, the least first: against opening by turning, errors of the force, and by weight."""
     run, i = case.run, case.world
     K = len(run.points)
     off = np.linalg.norm(run.force_measured[i] - run.force[i], axis=-1)
