@@ -95,7 +95,7 @@ def _say_when_compiling() -> None:
             from pivoting.controller.kernel import CACHE  # whatever compiles has imported it
 
             if CACHE is None:
-                where = "in memory, in every run: no folder for a cache can be written to, NUMBA_CACHE_DIR names one"
+                where = "in memory, in every run: no folder for a cache can be written to; NUMBA_CACHE_DIR sets one"
             else:
                 where = f"for this machine, once, for up to a minute; later runs take it from {CACHE}"
             print(f"pivoting: compiling {where}", file=sys.stderr, flush=True)

@@ -13,10 +13,10 @@ from pivoting.controller.rotations import Turn
 from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product, space
 from pivoting.controller.validate import fail
-from pivoting.models.candidates import NEAR
 from pivoting.models.contact_settings import contact_settings
 from pivoting.models.frames import matrix
 from pivoting.models.friction import read_friction
+from pivoting.models.given import NEAR
 from pivoting.models.naming import ModelError
 from pivoting.models.reading import initial_data, place, read_body, turn
 from pivoting.models.scenes import Scene, load

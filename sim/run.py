@@ -15,6 +15,7 @@ from pivoting.models.contact_settings import ContactSettings
 from pivoting.models.frames import matrix
 from pivoting.models.naming import label
 from pivoting.models.reading import RigidBody
+from pivoting.sim.advice import reasons, remedies
 from pivoting.sim.attach import Attached
 from pivoting.sim.contact_readings import ContactReadings, Declared
 from pivoting.sim.control import BOUNDED, Event, PlanLog, plan_figures
@@ -313,6 +314,8 @@ class Run:
             "wall_s": self.wall_s,
             "real_time_factor": self.worlds * float(self.time[-1]) / self.wall_s,
             "bounded_steps": int(np.count_nonzero(self.status == BOUNDED)),
+            "reasons": reasons(self),
+            "remedies": [remedy.setting for remedy in remedies(self)],
             "undeclared_contacts": self.strays,
             "support": label(self.model, self.truth.support).strip("'"),
             "object": self.object,
