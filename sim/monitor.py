@@ -62,7 +62,7 @@ def measure(run: "Run") -> Measures:
     measured, predicted = run.force_measured[:, counted], run.force[:, counted]
     use = run.friction_use[:, steps]
     pushed = ~np.isnan(use)
-    height = run.corner[..., 2] - run.corner[:, :1, :, 2]
+    height = run.corner[..., 2] - np.maximum(run.corner[:, :1, :, 2], 0.0)  # one with a margin is held above the table
     lost = ~pushed.any(axis=2) | (height > LIFTED * run.size)[:, 1:][:, steps].any(axis=2)
     mismatch = _rms(np.linalg.norm(measured - predicted, axis=-1)) / _rms(np.linalg.norm(predicted, axis=-1))
     ever = pushed.any(axis=(1, 2))
