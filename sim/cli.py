@@ -1,6 +1,5 @@
 """The command line: `pivoting example | list | run`. Exit 0 for a pass, 1 for a fail, 2 for bad usage in one line."""
 
-import json
 import sys
 import tempfile
 from collections.abc import Callable
@@ -8,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from pivoting import __version__
+from pivoting.sim.stdout import JsonOutput, console, json_option
 
 if TYPE_CHECKING:
     from pivoting.sim.scenario import Scenario
@@ -16,21 +17,20 @@ if TYPE_CHECKING:
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="pivoting", message="%(package)s %(version)s")
+@click.version_option(__version__, message="pivoting %(version)s")
 def cli() -> None:
     """The smallest wrench that balances or pivots an object on a frictional contact, proved in MuJoCo."""
 
 
 @cli.command()
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
+@json_option("Print one JSON object and nothing else.")
 @click.option(
     "--figure", type=click.Path(path_type=Path), help="Also draw the solution space, a .png, .svg or .pdf file."
 )
-def example(as_json: bool, figure: Path | None) -> int:
+def example(as_json: JsonOutput | None, figure: Path | None) -> int:
     """Solve the notes' worked example by every method; exit 0 if all printed digits agree."""
     from pivoting.controller.example import EXAMPLES, compare_all
     from pivoting.sim.report import jsonable, print_examples
-    from rich.console import Console
 
     if figure is not None:
         _check_figure(figure)
@@ -60,9 +60,9 @@ def example(as_json: bool, figure: Path | None) -> int:
             }
             for digits, solution in results
         ]
-        click.echo(json.dumps(jsonable({"agrees": agree, "results": rows}), allow_nan=False))
+        as_json(jsonable({"agrees": agree, "results": rows}))
     else:
-        print_examples(Console(), results)
+        print_examples(console(), results)
         if figure is not None:
             click.echo(f"wrote {figure}")
     return 0 if agree else 1
@@ -72,9 +72,8 @@ def example(as_json: bool, figure: Path | None) -> int:
 def list_scenarios() -> int:
     """The scenarios, a line each."""
     from pivoting.sim.report import print_scenarios
-    from rich.console import Console
 
-    print_scenarios(Console())
+    print_scenarios(console())
     return 0
 
 
@@ -108,7 +107,7 @@ class _RunCommand(click.Command):
 @click.option("--open-loop", is_flag=True, help="Plan the whole motion once and apply that, whatever happens.")
 @click.option("--out", type=click.Path(), help="Folder for SCENARIO.rrd, SCENARIO.summary.json and summary.json.")
 @click.option("--record-world", type=click.IntRange(min=0), help="Which world is recorded; by default the worst.")
-@click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object and nothing else.")
+@json_option("Print the summary as one JSON object and nothing else.")
 def run(
     scenario: str,
     worlds: int,
@@ -118,7 +117,7 @@ def run(
     open_loop: bool,
     out: str | None,
     record_world: int | None,
-    as_json: bool,
+    as_json: JsonOutput | None,
     **own: Any,
 ) -> int:
     """Run SCENARIO in closed loop in MuJoCo; exit 0 if the verdict passes, 1 if it fails.
@@ -145,41 +144,57 @@ def run(
         finished = simulate(case, worlds, seed, progress=report, open_loop=open_loop)
 
     from pivoting.sim.report import jsonable, print_run
-    from rich.console import Console
 
+    also: dict[str, Any] = {}
+    if finished.verdict == "fail" and not open_loop:
+        from pivoting.sim.advice import tried
+
+        also["holds"] = tried(finished, simulate)
     saved = None
-    if folder is not None:
+    if folder is not None:  # before it is told: who is told may have gone
         from pivoting.sim.results import save
 
-        saved = save(finished, folder, record_world)
+        saved = save(finished, folder, record_world, also=also)
     if as_json:
-        summary = jsonable(finished.summary()) if saved is None else saved.summary
-        click.echo(json.dumps(summary, allow_nan=False))
+        as_json(jsonable({**finished.summary(), **also}) if saved is None else saved.summary)
     else:
-        print_run(Console(), finished)
+        print_run(console(), finished)
+        if also.get("holds"):
+            click.echo(f"what would hold it: {also['holds']['setting']} ({also['holds']['why']}; tried, it passes)")
+        elif also:
+            click.echo(
+                "what would hold it was not found: "
+                + ("; ".join(finished.summary()["remedies"]) or "-")
+                + " were tried"
+            )
     for line in () if saved is None else saved.said:
-        click.echo(line, err=as_json)
+        click.echo(line)  # under --json on stderr, as all else
     return 1 if finished.verdict == "fail" else 0
 
 
-def main() -> None:
-    """Entry point: every wrong use ends in one line on stderr and exit code 2; a fault of ours keeps its traceback."""
-    try:
-        code = cli.main(standalone_mode=False)
+def main() -> int:
+    """The exit code: every wrong use ends in one line on stderr and 2; a fault of ours keeps its traceback.
+
+    An interrupt and a reader of stdout that has gone are left to the process: `pivoting.__main__`.
+    """
+    try:  # not cli.main, which makes of an interrupt an empty line and a RuntimeError, and exits where a pipe breaks
+        with cli.make_context("pivoting", sys.argv[1:]) as context:
+            code: int = cli.invoke(context)
+    except click.exceptions.Exit as error:  # of --help and --version
+        return error.exit_code
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
-        code = 2
+        return 2
     except click.ClickException as error:
-        code = _refuse(error.format_message())
+        return _refuse(error.format_message())
+    except BrokenPipeError:
+        raise
     except _wrong_uses() as error:
-        code = _refuse(str(error))
+        return _refuse(str(error))
     except RuntimeError as error:  # no certified answer: the run ends without a verdict
         click.echo(f"pivoting: {error}", err=True)
-        code = 1
-    except click.Abort:
-        click.echo("pivoting: interrupted", err=True)
-        code = 130
-    sys.exit(code)
+        return 1
+    return code
 
 
 def _wrong_uses() -> tuple[type[Exception], ...]:

@@ -1,6 +1,6 @@
 """A closed-loop run, from a scenario to what is measured: the world, the belief, the start, the steps."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -13,9 +13,11 @@ from pivoting.controller.rotations import Turn
 from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product, space
 from pivoting.controller.validate import fail
-from pivoting.models.candidates import NEAR
+from pivoting.models.contact_settings import contact_settings
 from pivoting.models.frames import matrix
 from pivoting.models.friction import read_friction
+from pivoting.models.given import NEAR
+from pivoting.models.naming import ModelError
 from pivoting.models.reading import initial_data, place, read_body, turn
 from pivoting.models.scenes import Scene, load
 from pivoting.models.sensors import instrument
@@ -23,7 +25,9 @@ from pivoting.models.supports import body_size
 from pivoting.sim.attach import Attached, attach
 from pivoting.sim.contact_readings import Declared
 from pivoting.sim.control import BoundedControl, Control, LawControl
+from pivoting.sim.engine_log import engine_log
 from pivoting.sim.fidelity import ContactRows, read_rows
+from pivoting.sim.joint_drag import drag_wrench
 from pivoting.sim.keys import CONTROL_KEYS
 from pivoting.sim.plan import Plan, planned, transplanted
 from pivoting.sim.planning import horizon_control, play_control
@@ -35,6 +39,7 @@ from pivoting.sim.strays import contact_margin, refuse_strays
 
 Array = NDArray[np.float64]
 START_DEPTH = 1e-6  # of the lever from contact to CoM: there is contact from the first step on
+PRESSED, SAMPLES = 1e-3, 17  # levers that it is pressed in, and where along its way, to see what it touches with
 MAX_STEPS = 10_000_000  # worlds times steps that are kept in memory, about 0.5 kB each
 
 
@@ -75,10 +80,7 @@ def simulate(
     attached, believed = believe(case, controller, scene)
     asked, case = case, case.absolute(believed.load)
     world = scene.changed(case.actual)
-    model, where = instrument(world)
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that diverges is seen, not reset
-    # bodies of several geoms: a plane's bounding box is 5e9 m deep there, and misses contacts of less than 1e-6 m
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+    model, where = _instrumented(world)
     truth = read_body(model, world.body, world.support)
     plan = transplanted(believed, model, truth, world.scale / scene.changed(case.believed).scale)
     dt = float(model.opt.timestep)
@@ -97,6 +99,11 @@ def simulate(
     told, follow = _desired(case, believed, time)[1:]
     for values in (time, *reference, *desired):
         values.flags.writeable = False
+    settings = None
+    if case.chosen and not {"timeconst", "impedance"} & set(case.actual):
+        poses = desired[0][np.linspace(0, steps, SAMPLES).astype(int)]
+        settings = contact_settings(model, truth.index, truth.support, _pressed(model, plan, poses), dt)
+        model, where = _instrumented(world.with_contacts(settings))
 
     batch = Batch(model, int(worlds), nthread=1 if worlds == 1 else 0, persistent=True)
     errors = np.deg2rad(case.spread) * np.random.default_rng(seed).uniform(-1.0, 1.0, int(worlds))
@@ -106,8 +113,11 @@ def simulate(
         values.flags.writeable = False
 
     bounds = case.bounds()
-    control: Control = LawControl(attached.controller, told, bounds)
+    drag = drag_wrench(attached.body, attached.controller, *told[:2])
+    control: Control = LawControl(attached.controller, told, bounds, drag)
     horizons = played = None
+    if attached.body.drag is not None and (open_loop or case.plan_hz is not None):
+        raise ModelError(f"body = {attached.body.name!r}: a plan knows no joint damping or friction; must have none")
     if open_loop:
         control = played = play_control(case, attached, believed, follow, dt, steps)
     elif case.plan_hz is not None:
@@ -123,7 +133,8 @@ def simulate(
         landing=case.limits.contacts_end > 0,
     )
     contacts = ContactLog(declared, where, steps, int(worlds))
-    log = run_steps(batch, control, attached.controller, contacts, truth.index, where, steps, progress)
+    with engine_log() as warned:
+        log = run_steps(batch, control, attached.controller, contacts, truth.index, where, steps, progress)
     axes = matrix(truth.table) @ space(d).force_map
     return Run(
         scenario=asked,
@@ -131,6 +142,7 @@ def simulate(
         attached=attached,
         load=believed.load,
         replaced=world.replaced,
+        settings=settings,
         model=model,
         truth=truth,
         declared=declared,
@@ -160,8 +172,27 @@ def simulate(
         plan=None if played is None else played.plan,
         plans=None if horizons is None else horizons.log,
         events=() if horizons is None else tuple(horizons.events),
+        engine_warnings=tuple(warned),
         controller="scenario" if controller is None else "given",
     )
+
+
+def _instrumented(world: Scene) -> tuple[mujoco.MjModel, dict[str, slice]]:
+    """The model that is simulated, and where each reading is in its sensordata."""
+    model, where = instrument(world)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that diverges is seen, not reset
+    # bodies of several geoms: a plane's bounding box is 5e9 m deep there, and misses contacts of less than 1e-6 m
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+    return model, where
+
+
+def _pressed(model: mujoco.MjModel, plan: Plan, orientations: Array) -> Iterator[Array]:
+    """The qpos of the object pressed on its contact at each of these orientations (S, 4)."""
+    data, up, point = initial_data(model), matrix(plan.body.table)[:, 2], plan.contacts[0]
+    lever = float(np.linalg.norm(plan.body.com - point) + plan.radius[0])
+    for orientation in orientations:
+        place(model, data, plan.body, orientation, point, plan.at + (plan.radius[0] - PRESSED * lever) * up)
+        yield np.array(data.qpos)
 
 
 def _start(

@@ -96,6 +96,10 @@ def print_run(console: Console, run: Run) -> None:
     if summary["bounded_steps"]:
         told = f"{summary['bounded_steps']} of {run.status.size} steps: the bounds did not allow what was asked for"
         console.print(told, style="yellow", soft_wrap=True)
+    for warning in run.engine_warnings:
+        console.print(f"MuJoCo: {warning}", style="yellow", highlight=False, soft_wrap=True)
+    for reason in summary["reasons"]:
+        console.print(f"why: {reason}", style="yellow", soft_wrap=True, highlight=False)
     for event in run.events[:_EVENTS]:
         console.print(f"world {event.world}, {event.time:.3f} s: {event.what}", style="yellow", soft_wrap=True)
     if len(run.events) > _EVENTS:

@@ -11,9 +11,11 @@ from pivoting.controller.plan import Plan
 from pivoting.controller.so3 import rotated
 from pivoting.controller.space import CONJUGATE, Space, quaternion_product, space
 from pivoting.controller.units import lever
+from pivoting.models.contact_settings import ContactSettings
 from pivoting.models.frames import matrix
 from pivoting.models.naming import label
 from pivoting.models.reading import RigidBody
+from pivoting.sim.advice import reasons, remedies
 from pivoting.sim.attach import Attached
 from pivoting.sim.contact_readings import ContactReadings, Declared
 from pivoting.sim.control import BOUNDED, Event, PlanLog, plan_figures
@@ -25,6 +27,7 @@ from pivoting.sim.strays import stray_words
 from pivoting.sim.verdict import Check, Limits, judge, worst_world
 
 Array = NDArray[np.float64]
+_CHOSEN = ("contacts", "coupling", "reason")  # of the contact settings, what the model itself does not say
 
 
 def frozen(values: Array) -> Array:
@@ -52,6 +55,7 @@ class Run:
         load: what the scenario's relative values are relative to.
         model: the world's, with the sensors of the loop.  truth: the body as that has it.
         replaced: what of the file gave way to the settings of the shipped scenes: name, and what it was.
+        settings: contact parameters that were chosen for the object, if they were.
         declared: the contacts that are to stick, as the world has them.
         radius: (K,) of what rolls, else 0 [m].
         face: (P, 3) likewise, the corners of the face that the object lies on at angle 0.
@@ -77,6 +81,7 @@ class Run:
         wall_s: of the loop.
         plan: that was played in open loop, else None.
         plans: of a receding horizon, what came of each; else None.  events: what a user has to know of.
+        engine_warnings: what MuJoCo warned of, as of a world that diverges: each once, with its first time.
         controller: "scenario" for the scenario's own, "given" for another that was handed to `simulate`.
     """
 
@@ -87,6 +92,7 @@ class Run:
     model: mujoco.MjModel
     truth: RigidBody
     replaced: tuple[tuple[str, str], ...]
+    settings: ContactSettings | None
     declared: Declared
     radius: Array
     face: Array
@@ -114,6 +120,7 @@ class Run:
     plan: Plan | None
     plans: PlanLog | None
     events: tuple[Event, ...]
+    engine_warnings: tuple[str, ...]
     controller: str
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -299,11 +306,14 @@ class Run:
             "wall_s": self.wall_s,
             "real_time_factor": self.worlds * float(self.time[-1]) / self.wall_s,
             "bounded_steps": int(np.count_nonzero(self.status == BOUNDED)),
+            "reasons": reasons(self),
+            "remedies": [remedy.setting for remedy in remedies(self)],
             "undeclared_contacts": self.strays,
             "support": label(self.model, self.truth.support).strip("'"),
             "object": self.object,
             "contact_settings": self.contact_settings,
             "events": [event._asdict() for event in self.events],
+            "engine_warnings": list(self.engine_warnings),
             **({} if self.plans is None else plan_figures(self.plans)),
             **({} if self.plan is None else {"plan_angle_error_max_deg": float(np.rad2deg(self.plan_error.max()))}),
         }
@@ -335,6 +345,7 @@ class Run:
             "impratio": float(opt.impratio),
             "cone": mujoco.mjtCone(int(opt.cone)).name.removeprefix("mjCONE_").lower(),
             "replaced": dict(self.replaced),
+            **({} if self.settings is None else {key: getattr(self.settings, key) for key in _CHOSEN}),
         }
 
     @cached_property
