@@ -7,9 +7,8 @@ imported is kept off stdout.
 import os
 import signal
 import sys
-from _thread import interrupt_main
 from collections.abc import Callable
-from threading import Timer
+from threading import Timer, get_ident
 from time import monotonic
 from types import FrameType
 from typing import Any, NoReturn
@@ -66,7 +65,7 @@ class _Interrupt:
         """Raised in a callback or finalizer it would be lost: it comes again, when that is over."""
         if issubclass(lost.exc_type, KeyboardInterrupt):
             self._last = -1.0
-            Timer(0.01, interrupt_main).start()
+            Timer(0.01, signal.pthread_kill, (get_ident(), signal.SIGINT)).start()
 
 
 def _open_streams() -> None:
