@@ -1,4 +1,4 @@
-"""Whether a body has a contact to be tilted about, by turning it in steps: a second implementation, of nothing else here.
+"""Whether a body has a contact to be tilted about, by turning it in steps: a second implementation of that alone.
 
 What touches a table is the convex hull of a body's colliding geoms. Every face of it is laid on the table in turn, and
 the body is turned off that about each corner and each edge of the face, in steps, each time with the heights of all

@@ -94,10 +94,8 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
     table, gap = matrix(body.table), np.deg2rad(LOWEST)
     data = initial_data(model)
     now = data.xmat[body.index].reshape(3, 3)
-    contact = case.contact
-    if not isinstance(contact, str):
-        contact = _in_body_frame(contact, file_frame(model, body.index))
     origin, axes = file_frame(model, body.index)
+    contact = case.contact if isinstance(case.contact, str) else _in_body_frame(case.contact, (origin, axes))
     found = stance(
         model,
         body.index,
@@ -123,8 +121,9 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
 
 def _arc(case: Scenario) -> Arc | None:
     """The angles of the scenario's motion, first that at which it begins; None if it gives no angles."""
-    time = np.linspace(0.0, case.duration, SAMPLES)
-    angle = np.array(case.motion(time)[0], dtype=float)
+    timed = case.absolute(Load(1.0, 1.0, 1.0))  # whatever the time that is relative: it changes no angle
+    time = np.linspace(0.0, timed.duration, SAMPLES)
+    angle = np.array(timed.motion(time)[0], dtype=float)
     if angle.shape != time.shape or not np.isfinite(angle).all():
         return None
     low, high = float(angle.min()), float(angle.max())
