@@ -4,8 +4,8 @@ The rule. Of each package the files that its line in `PACKAGES` names are read: 
 MJCF file that MuJoCo compiles as it is gives its rigid things: what has a free joint, or, in a file without any joint,
 whatever stands on the world; with all that hangs on it rigidly, if something of it collides. A mesh is a thing of the
 density of water, if MuJoCo compiles it so. What has no volume (planes, height fields), or is moved by hand (mocap), is
-none. They are shuffled by the seed, and the first `EACH` are taken that MuJoCo compiles alone and that are no copies: of
-the type, mass, inertia and extent of one before. The rule knows nothing of controllers, nor of what can be tilted.
+none. They are shuffled by the seed, and the first `EACH` taken that MuJoCo compiles alone and that are no copies, of
+the types, mass, inertia and extent of one before. The rule knows nothing of controllers, nor of what can be tilted.
 
     python benchmarks/object_list.py      draws again: benchmarks/objects.json has to come out as it is
 """
@@ -55,7 +55,10 @@ PACKAGES = {
     "gym-hil==0.1.14": ("gym_hil/**/*.xml",),
     "gym-xarm==0.1.1": ("gym_xarm/**/*.xml",),
 }
-SOLID = {int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}")) for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")}
+SOLID = {
+    int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"))
+    for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")
+}
 FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 
 
@@ -151,7 +154,9 @@ def scene(thing: Thing) -> Path:
         model = theirs.compile()
         for assets, folder in ((theirs.meshes, theirs.meshdir), (theirs.textures, theirs.texturedir)):
             for asset in assets:  # a written file has one folder for all of its parts
-                asset.file = asset.file and str(Path(folder) / (Path(asset.file).name if theirs.strippath else asset.file))
+                asset.file = asset.file and str(
+                    Path(folder) / (Path(asset.file).name if theirs.strippath else asset.file)
+                )
         theirs.meshdir = theirs.texturedir = ""
         if thing.body:
             index = int(thing.body[1:]) if thing.body.startswith("#") else model.body(thing.body).id
@@ -207,7 +212,9 @@ def shape(path: Path) -> tuple[Any, ...]:
     """What copies have in common: mass, inertia and extent, to three digits, and the colliding geoms' types."""
     model = mujoco.MjModel.from_xml_path(str(path))
     points = surface(model, 1)
-    extent = np.ptp(np.concatenate([points.points + points.radius[:, None], points.points - points.radius[:, None]]), axis=0)
+    extent = np.ptp(
+        np.concatenate([points.points + points.radius[:, None], points.points - points.radius[:, None]]), axis=0
+    )
     numbers = [model.body_subtreemass[1], *np.sort(model.body_inertia[1]), *np.sort(extent)]
     return (*(f"{x:.2e}" for x in numbers), *sorted(model.geom_type[1:].tolist()))
 
