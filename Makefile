@@ -1,58 +1,80 @@
-# Every target works from a bare checkout: it needs python >= 3.11 and make, and makes .venv itself.
+# Every target works from a bare checkout: it needs python 3.11 to 3.14 and make, and makes .venv itself, of what lock/
+# names. `make help` lists the targets.
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
+PIP := pip install --quiet --disable-pip-version-check
+TESTS := -m pytest -n 2 --dist loadfile
+UV := .venv-lock/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
+	--custom-compile-command "make lock"
 
-.PHONY: demo test check bench evidence study objects figures clean
+.PHONY: help demo test check latest bench evidence study objects figures lock clean
 
-demo: $(STAMP)
+demo: $(STAMP)  ## the worked example, a block pivoted in MuJoCo, its verdict, a recording and a picture in out/
 	@mkdir -p out
 	$(BIN)/pivoting example --figure out/solution-space.png
 	$(BIN)/pivoting run pivot-2d --out out
 	@echo "the solution space: out/solution-space.png; the recording: $(BIN)/rerun out/pivot-2d.rrd"
 
-test: $(STAMP)
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+test: $(STAMP)  ## the proof: all tests
+	$(BIN)/python $(TESTS)
 
-check: $(STAMP)
+check: $(STAMP)  ## lint, format and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-# The peers of bench_solve.py and bench_horizon.py are the extra [bench]; those that are not there are skipped.
-bench: $(STAMP)
-	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[dev,bench]'
+latest:  ## the newest of every dependency in place of the lock, in .venv-latest, and all tests
+	$(PYTHON) -m venv --clear .venv-latest
+	.venv-latest/bin/$(PIP) --upgrade --editable '.[dev]'
+	NUMBA_CACHE_DIR=$(CURDIR)/.venv-latest/kernels .venv-latest/bin/python $(TESTS)
+
+bench: .venv/.peers  ## timings, against peers (the extra [bench], 300 MB), into benchmarks/results
 	$(BIN)/python benchmarks/bench_loop.py --json benchmarks/results/loop.json
 	$(BIN)/python benchmarks/bench_solve.py --json benchmarks/results/solve.json
 	$(BIN)/python benchmarks/bench_horizon.py --json benchmarks/results/horizon.json
 
 # 200,000 planar and 100,000 other random problems, 256 perturbed worlds of every scenario: minutes, so not in `make test`.
-evidence: $(STAMP)
+evidence: $(STAMP)  ## random problems by the hundred thousand, 256 worlds of every scenario
 	$(BIN)/python benchmarks/evidence.py --json benchmarks/results/evidence.json
 	$(BIN)/python benchmarks/evidence_space.py --json benchmarks/results/evidence_space.json
 
 # How fast each formulation can pivot, what a horizon saves, and how short an arc can be within bounds: docs/formulations.md.
-study: $(STAMP)
+study: $(STAMP)  ## how fast each formulation can pivot, and what a horizon saves
 	$(BIN)/python benchmarks/bench_formulations.py --json benchmarks/results/formulations.json
 	$(BIN)/python benchmarks/bench_effort.py --json benchmarks/results/effort.json
 
-# Objects out of published packages, fetched (270 MB) and pivoted.
-objects: $(STAMP)
+objects: $(STAMP)  ## objects out of published packages, fetched (270 MB) and pivoted
 	$(BIN)/python benchmarks/foreign_objects.py --json benchmarks/results/objects.json
 
-# The pictures that README.md and docs/formulations.md show.
-figures: $(STAMP)
+figures: $(STAMP)  ## the pictures that README.md and docs/formulations.md show
 	$(BIN)/pivoting example --figure docs/solution-space.png
 	$(BIN)/python benchmarks/bench_formulations.py --figure benchmarks/results/formulations.json docs/formulations.png
 	$(BIN)/python benchmarks/bench_effort.py --figure benchmarks/results/effort.json docs/effort.png
 
-$(STAMP): pyproject.toml
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "python >= 3.11 is needed: make PYTHON=...")'
-	$(PYTHON) -m venv .venv
-	$(BIN)/pip install --quiet --disable-pip-version-check --upgrade pip
-	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[dev]'
-	@mkdir -p out
+lock:  ## renew lock/: the newest versions that pyproject.toml allows, with their hashes
+	$(PYTHON) -m venv .venv-lock
+	.venv-lock/bin/$(PIP) --upgrade uv
+	$(UV) --extra dev pyproject.toml --output-file lock/dev.txt
+	$(UV) --extra dev --extra bench --constraint lock/dev.txt pyproject.toml --output-file lock/bench.txt
+
+help:  ## this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-10s%s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+clean:  ## remove everything that was made
+	rm -rf .venv .venv-latest .venv-lock out build dist *.egg-info
+
+# Nothing is asked of a package registry but the files that the lock names, by their hashes.
+.venv/.locked: lock/dev.txt
+	$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 15) and "python 3.11 to 3.14 is needed: make PYTHON=...")'
+	$(PYTHON) -m venv --clear .venv
+	$(BIN)/$(PIP) --require-hashes --only-binary :all: --requirement lock/dev.txt
 	@touch $@
 
-clean:
-	rm -rf .venv out build dist *.egg-info
+$(STAMP): .venv/.locked pyproject.toml
+	$(BIN)/$(PIP) --no-index --no-deps --no-build-isolation --editable .
+	@touch $@
+
+.venv/.peers: $(STAMP) lock/bench.txt
+	$(BIN)/$(PIP) --require-hashes --only-binary :all: --requirement lock/bench.txt
+	@touch $@

@@ -2,11 +2,12 @@
 
 from pathlib import Path
 
+from pivoting.controller.kernel import CACHE
 from pivoting.controller.stale import drop_stale_kernels
 
-drop_stale_kernels(Path(__file__).parent)  # before any kernel is loaded
+if CACHE is not None:
+    drop_stale_kernels(Path(__file__).parent, CACHE)  # before any kernel is loaded
 
-# ruff: noqa: E402
 from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.conic import ClarabelWorkspace
 from pivoting.controller.contacts import Contact

@@ -216,14 +216,13 @@ def solver(method: str, **options: Any) -> Solver:
     Raises:
         ValueError: an unknown method, or a backend that is not installed.
     """
-    from pivoting.controller.solvers import methods
+    from pivoting.controller.solvers import backend
 
     if method == "clarabel":
         return ClarabelInPlace(**options)
-    if method in methods() and method.startswith("qp:"):
-        return QuadraticBackend(method[3:], **options)
-    known = [name for name in methods() if name != "closed-form"]
-    raise fail("method", method, "one of " + ", ".join(known))
+    if method.startswith("qp:"):
+        return QuadraticBackend(backend(method), **options)
+    raise fail("method", method, "clarabel or qp:<backend>")
 
 
 def kkt_residual(program: ConicProgram, x: Array, z: Array) -> float:

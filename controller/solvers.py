@@ -78,7 +78,7 @@ def pyramid_excess(problem: WrenchProblem, edges: int = EDGES, *, backend: str =
 
 def methods() -> tuple[str, ...]:
     """Every method that `solve` can use here: the backends of qpsolvers depend on what is installed and licensed."""
-    return ("closed-form", "clarabel", *(f"qp:{name}" for name in sorted(_backends())))
+    return ("closed-form", "clarabel", *(f"qp:{name}" for name in sorted(_installed()) if _answers(name)))
 
 
 Options = dict[str, Any]
@@ -102,36 +102,51 @@ def _route(method: str) -> Callable[[WrenchProblem, Options, int], Answer]:
     if method == "clarabel":
         return lambda problem, options, edges: clarabel_answer(problem, options)
     if method.startswith("qp:"):
-        installed = _backends()
-        if method[3:] not in installed:
-            raise fail("method", method, "qp:<backend> with an installed backend: " + ", ".join(sorted(installed)))
-        return partial(_qp, method[3:])
+        return partial(_qp, backend(method))
     raise fail("method", method, "one of closed-form, clarabel, qp:<backend>")
 
 
-@cache
-def _backends() -> list[str]:
-    """The backends of qpsolvers that solve min x^2 / 2 s.t. x >= 1: one that is installed may lack its licence."""
+def backend(method: str) -> str:
+    """The backend that "qp:<backend>" names; no other is tried.
+
+    Raises:
+        ValueError: it is not installed, or does not solve.
+    """
+    name = method.removeprefix("qp:")
+    if name not in _installed():
+        raise fail("method", method, "qp:<backend> with an installed backend: " + ", ".join(sorted(_installed())))
+    if not _answers(name):
+        raise fail("method", method, f"qp:<backend> with one that solves; {name} is installed, but may lack a licence")
+    return name
+
+
+def _installed() -> list[str]:
     with warnings.catch_warnings():  # qpsolvers warns about deprecated backends when it is imported
         warnings.simplefilter("ignore")
         import qpsolvers
-        from scipy import sparse
+    names: list[str] = qpsolvers.available_solvers
+    return names
 
+
+@cache
+def _answers(name: str) -> bool:
+    """Whether a backend of qpsolvers solves min x^2 / 2 s.t. x >= 1: one that is installed may lack its licence."""
+    import qpsolvers
+    from scipy import sparse
+
+    if name == "mosek" and not _mosek_licence():
+        return False
     one = np.ones((1, 1))
-    answering = []
-    for name in qpsolvers.available_solvers:
-        if name == "mosek" and not _mosek_licence():
-            continue
-        P, G = (one, -one) if name in qpsolvers.dense_solvers else (sparse.csc_matrix(one), sparse.csc_matrix(-one))
-        with contextlib.suppress(Exception), warnings.catch_warnings():  # each backend has exceptions of its own
-            warnings.simplefilter("ignore")
-            if qpsolvers.solve_problem(qpsolvers.Problem(P, np.zeros(1), G, -np.ones(1)), solver=name).found:
-                answering.append(name)
-    return answering
+    P, G = (one, -one) if name in qpsolvers.dense_solvers else (sparse.csc_matrix(one), sparse.csc_matrix(-one))
+    with contextlib.suppress(Exception), warnings.catch_warnings():  # each backend has exceptions of its own
+        warnings.simplefilter("ignore")
+        stated = qpsolvers.Problem(P, np.zeros(1), G, -np.ones(1))
+        return bool(qpsolvers.solve_problem(stated, solver=name).found)
+    return False
 
 
 def _mosek_licence() -> bool:
-    """Without one Mosek complains on stdout, where `--json` promises only JSON; Drake's wheel brings it along."""
+    """Without one Mosek complains on stdout; Drake's wheel brings it along."""
     return "MOSEKLM_LICENSE_FILE" in os.environ or (Path.home() / "mosek" / "mosek.lic").exists()
 
 
@@ -147,18 +162,18 @@ def _compiled(problem: WrenchProblem, options: Options, edges: int) -> Answer:
     return w, f, "compiled kernel"
 
 
-def _qp(backend: str, problem: WrenchProblem, options: Options, edges: int) -> Answer:
+def _qp(name: str, problem: WrenchProblem, options: Options, edges: int) -> Answer:
     import qpsolvers
     from scipy import sparse
 
     form, unit = scaled(problem.standard_form(edges=edges))
     matrices = [form.P, form.C, form.A]
-    if backend not in qpsolvers.dense_solvers:
+    if name not in qpsolvers.dense_solvers:
         matrices = [sparse.csc_matrix(matrix) for matrix in matrices]
     P, C, A = matrices
     stated = qpsolvers.Problem(P, np.zeros(form.P.shape[0]), C, form.d, A, form.b)
     try:
-        answer = qpsolvers.solve_problem(stated, solver=backend, **{**_TIGHT.get(backend, {}), **options})
+        answer = qpsolvers.solve_problem(stated, solver=name, **{**_TIGHT.get(name, {}), **options})
     except Exception as error:  # each backend has its own: what it says is kept, and there is no answer
         return split(problem, None, f"{type(error).__name__}: {error}", unit)
     return split(problem, answer.x, "found" if answer.found else "not found", unit)

@@ -3,22 +3,28 @@
 Without this, an edit of `certificate.py` would leave the loop compiled in `controller.py` running the old certificate.
 """
 
+import hashlib
+import os
 from contextlib import suppress
 from pathlib import Path
 
-from numba import config
 
+def drop_stale_kernels(room: Path, cache: Path) -> list[Path]:
+    """Remove the kernels compiled into the folder `cache` of other sources than `room` has now; returns what went.
 
-def drop_stale_kernels(room: Path) -> list[Path]:
-    """Remove the compiled kernels of a folder if any of its sources is newer than one of them; returns what went."""
-    newest = max(source.stat().st_mtime for source in room.glob("*.py"))
-    folders = [room / "__pycache__"]
-    if config.CACHE_DIR:  # numba then makes one folder for each folder of sources, named after it
-        folders += Path(config.CACHE_DIR).glob(f"{room.name}_*")
-    compiled = [path for folder in folders for path in folder.glob("*.nb[ic]") if path.is_file()]
-    with suppress(FileNotFoundError):  # another process is dropping them
-        if all(path.stat().st_mtime >= newest for path in compiled if path.suffix == ".nbi"):
+    Sources are told apart by what they say: dates of installed files need not grow from one version to the next.
+    """
+    digest = hashlib.sha256()
+    for source in sorted(room.glob("*.py")):
+        digest.update(source.name.encode() + b"\0" + hashlib.sha256(source.read_bytes()).digest())
+    now, kept = digest.hexdigest(), cache / "kernels.sha256"
+    with suppress(FileNotFoundError):
+        if kept.read_text() == now:
             return []
-    for path in compiled:
-        path.unlink(missing_ok=True)
-    return compiled
+    stale = [path for path in cache.glob("*.nb[ic]") if path.is_file()]
+    for path in stale:
+        path.unlink(missing_ok=True)  # another process may be dropping them
+    partial = cache / f"{kept.name}.{os.getpid()}"
+    partial.write_text(now)
+    partial.replace(kept)
+    return stale

@@ -98,21 +98,12 @@ def read_body(model: mujoco.MjModel, name: str, support: str | None = None) -> R
         ModelError: there is no such body, or it cannot be served.
     """
     index = body_id(model, name)
-    joints = range(model.body_jntadr[index], model.body_jntadr[index] + model.body_jntnum[index])
-    kinds = [int(model.jnt_type[j]) for j in joints]
-    slide, hinge, free = (int(getattr(mujoco.mjtJoint, f"mjJNT_{kind}")) for kind in ("SLIDE", "HINGE", "FREE"))
-    if not kinds:
-        raise ModelError(f"body = {name!r}: it has no joint, so no free motion; needs {JOINTS}")
-    if model.body_parentid[index] != 0:
-        raise ModelError(f"body = {name!r}: it hangs on another body; must be a child of the world")
-    if kinds not in ([slide, slide, hinge], [free]):
-        words = ", ".join(mujoco.mjtJoint(kind).name.removeprefix("mjJNT_").lower() for kind in kinds)
-        raise ModelError(f"body = {name!r}: its joints are {words}; needs {JOINTS}")
+    dim = degrees_of_freedom(model, index)
     if (model.body_parentid[1:] == index).any():
         raise ModelError(f"body = {name!r}: other bodies hang on it; their mass would not be counted")
     _refuse_flags(model)
     data = initial_data(model)
-    dim = 3 if kinds == [free] else 2
+    joints = range(model.body_jntadr[index], model.body_jntadr[index] + model.body_jntnum[index])
     normal = None
     if dim == 2:
         first, second, normal = (data.xaxis[j] for j in joints)
@@ -150,6 +141,26 @@ def file_frame(model: mujoco.MjModel, body: int) -> tuple[Array, Array]:
         if model.site(int(site)).name == FILE_FRAME:
             return np.array(model.site_pos[site]), matrix(model.site_quat[site])
     return np.zeros(3), np.eye(3)
+
+
+def degrees_of_freedom(model: mujoco.MjModel, index: int) -> int:
+    """2 of a body that moves in a plane, 3 of one that moves freely.
+
+    Raises:
+        ModelError: it moves otherwise, or hangs on another.
+    """
+    name = model.body(index).name or f"#{index}"
+    joints = range(model.body_jntadr[index], model.body_jntadr[index] + model.body_jntnum[index])
+    kinds = [int(model.jnt_type[j]) for j in joints]
+    slide, hinge, free = (int(getattr(mujoco.mjtJoint, f"mjJNT_{kind}")) for kind in ("SLIDE", "HINGE", "FREE"))
+    if not kinds:
+        raise ModelError(f"body = {name!r}: it has no joint, so no free motion; needs {JOINTS}")
+    if model.body_parentid[index] != 0:
+        raise ModelError(f"body = {name!r}: it hangs on another body; must be a child of the world")
+    if kinds not in ([slide, slide, hinge], [free]):
+        words = ", ".join(mujoco.mjtJoint(kind).name.removeprefix("mjJNT_").lower() for kind in kinds)
+        raise ModelError(f"body = {name!r}: its joints are {words}; needs {JOINTS}")
+    return 3 if kinds == [free] else 2
 
 
 def _refuse_flags(model: mujoco.MjModel) -> None:

@@ -1,6 +1,6 @@
-"""`python -m pivoting.sim` is the command line."""
+"""`python -m pivoting.sim` is the command line, as `python -m pivoting` is."""
 
-from pivoting.sim.cli import main
+from pivoting.__main__ import main
 
 if __name__ == "__main__":
     main()

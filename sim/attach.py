@@ -16,6 +16,7 @@ from pivoting.models.frames import matrix
 from pivoting.models.friction import read_friction
 from pivoting.models.naming import ModelError
 from pivoting.models.reading import RigidBody, read_body
+from pivoting.sim.joint_drag import drag_wrench
 
 Array = NDArray[np.float64]
 
@@ -80,7 +81,9 @@ class Attached:
             ValueError: `reference` is not finite.
         """
         target = reference if isinstance(reference, Motion) else Motion(reference)
-        return solve(self.controller.problem(self.state(data), target))
+        state, omega = self.state(data), self.controller.space.lift_motion(target)[1]
+        known = drag_wrench(self.body, self.controller, self._orientation(data), omega)[0]
+        return solve(self.controller.problem(state, target, external=known))
 
     def wrench(self, data: mujoco.MjData, reference: ArrayLike | Motion) -> Array:
         """(6,) force [N] and torque [N m] at the CoM in world axes: assign it to `data.xfrc_applied[body]`.

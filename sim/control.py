@@ -61,12 +61,13 @@ class _Law:
     def __init__(self, controller: WrenchController, bounds: WrenchBounds):
         self._belief, self._work = controller.belief, controller.workspace()
         self._bounds = bounds.stacked(len(controller.Q_w))
-        self._external = np.zeros((1, len(controller.Q_w)))
+        self._none = np.zeros((1, len(controller.Q_w)))
 
-    def __call__(self, states: States, desired: list[Array], out: Answers) -> None:
-        """`desired`: orientations, angular velocities and accelerations, see `step_worlds`."""
+    def __call__(self, states: States, desired: list[Array], out: Answers, external: Array | None = None) -> None:
+        """`desired`: orientations, angular velocities, accelerations; `external`: see `step_worlds`, None for none."""
         measured = states.orientation, states.angular_velocity
-        step_worlds(self._belief, self._bounds, self._work, TOLERANCE, *measured, *desired, self._external, *out)
+        known = self._none if external is None else external
+        step_worlds(self._belief, self._bounds, self._work, TOLERANCE, *measured, *desired, known, *out)
 
 
 class LawControl:
@@ -75,13 +76,21 @@ class LawControl:
     Args:
         desired: (N+1, 4), (N+1, 3), (N+1, 3), the reference at every step.
         bounds: on the wrench.
+        external: (N+1, nw) known wrenches on the object at every step, object axes; or (1, nw), always the same.
     """
 
-    def __init__(self, controller: WrenchController, desired: tuple[Array, Array, Array], bounds: WrenchBounds):
-        self._law, self._desired = _Law(controller, bounds), desired
+    def __init__(
+        self,
+        controller: WrenchController,
+        desired: tuple[Array, Array, Array],
+        bounds: WrenchBounds,
+        external: Array,
+    ):
+        self._law, self._desired, self._external = _Law(controller, bounds), desired, external
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
-        self._law(states, [values[k : k + 1] for values in self._desired], out)
+        j = min(k, len(self._external) - 1)
+        self._law(states, [values[k : k + 1] for values in self._desired], out, self._external[j : j + 1])
 
     def prepare(self, states: States, out: Answers) -> None:
         """Compile."""

@@ -1,6 +1,6 @@
 """A closed-loop run, from a scenario to what is measured: the world, the belief, the start, the steps."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -13,27 +13,35 @@ from pivoting.controller.rotations import Turn
 from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product, space
 from pivoting.controller.validate import fail
-from pivoting.models.candidates import NEAR
+from pivoting.models.contact_settings import contact_settings
 from pivoting.models.frames import matrix
 from pivoting.models.friction import read_friction
+from pivoting.models.given import NEAR
+from pivoting.models.naming import ModelError
 from pivoting.models.reading import initial_data, place, read_body, turn
 from pivoting.models.scenes import Scene, load
 from pivoting.models.sensors import instrument
 from pivoting.models.supports import body_size
 from pivoting.sim.attach import Attached, attach
 from pivoting.sim.contact_readings import Declared
-from pivoting.sim.control import BoundedControl, Control, LawControl
-from pivoting.sim.fidelity import ContactRows, read_rows
+from pivoting.sim.control import Answers, BoundedControl, Control, LawControl, States
+from pivoting.sim.engine_log import engine_log
+from pivoting.sim.fidelity import read_rows
+from pivoting.sim.joint_drag import drag_wrench
 from pivoting.sim.keys import CONTROL_KEYS
 from pivoting.sim.plan import Plan, planned, transplanted
 from pivoting.sim.planning import horizon_control, play_control
 from pivoting.sim.run import Run, frozen
-from pivoting.sim.scenario import Scenario, scenario
+from pivoting.sim.scenario import Scenario
+from pivoting.sim.shipped import scenario
 from pivoting.sim.stepping import ContactLog, run_steps
 from pivoting.sim.strays import contact_margin, refuse_strays
 
 Array = NDArray[np.float64]
 START_DEPTH = 1e-6  # of the lever from contact to CoM: there is contact from the first step on
+DEEPEST = 1e-2  # likewise, that an object is put at rest in its support
+PRESSED, SAMPLES = 1e-3, 17  # levers that it is pressed in, and where along its way, to see what it touches with
+Samples = tuple[Array, Array, Array]  # orientations, angular velocities and accelerations
 MAX_STEPS = 10_000_000  # worlds times steps that are kept in memory, about 0.5 kB each
 
 
@@ -70,22 +78,21 @@ def simulate(
     for key, value, least in (("worlds", worlds, 1), ("seed", seed, 0)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
             raise fail(key, value, f"a whole number >= {least}")
-    if case.gravity == 0.0 and case.f_min == 0.0:
-        raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the corner on the table")
     scene = load(case.path, body=case.body, support=case.support, chosen=case.chosen)
     attached, believed = believe(case, controller, scene)
+    asked, case = case, case.absolute(believed.load)
     world = scene.changed(case.actual)
-    model, where = instrument(world)
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that diverges is seen, not reset
-    # bodies of several geoms: a plane's bounding box is 5e9 m deep there, and misses contacts of less than 1e-6 m
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+    model, where = _instrumented(world)
     truth = read_body(model, world.body, world.support)
     plan = transplanted(believed, model, truth, world.scale / scene.changed(case.believed).scale)
     dt = float(model.opt.timestep)
     steps = round(case.duration / dt)
-    if steps < 2 or steps * worlds > MAX_STEPS:
-        allowed = f"such that {worlds} worlds take 2 to {MAX_STEPS} steps together, at dt = {dt:g} s"
-        raise fail("seconds", case.duration, allowed)
+    if not 2 <= steps <= MAX_STEPS:
+        raise fail("seconds", case.duration, f"such that a world takes 2 to {MAX_STEPS} steps, at dt = {dt:g} s")
+    if steps * worlds > MAX_STEPS:
+        raise fail(
+            "worlds", worlds, f"at most {MAX_STEPS // steps}: of {steps} steps each, more are not kept in memory"
+        )
     if steps * dt <= case.limits.settle_s:
         raise fail("seconds", case.duration, f"more than the {case.limits.settle_s:g} s that the verdict lets settle")
     time: Array = dt * np.arange(steps + 1, dtype=float)
@@ -94,17 +101,30 @@ def simulate(
     told, follow = _desired(case, believed, time)[1:]
     for values in (time, *reference, *desired):
         values.flags.writeable = False
+    pressed = list(_pressed(model, plan, desired[0][np.linspace(0, steps, SAMPLES).astype(int)]))
+    settings = None
+    if case.chosen and not {"timeconst", "impedance"} & set(case.actual):
+        settings = contact_settings(model, truth.index, truth.support, pressed, dt)
+        model, where = _instrumented(world.with_contacts(settings))
+    rows = read_rows(model, truth.index, truth.support, pressed)
 
     batch = Batch(model, int(worlds), nthread=1 if worlds == 1 else 0, persistent=True)
     errors = np.deg2rad(case.spread) * np.random.default_rng(seed).uniform(-1.0, 1.0, int(worlds))
-    rows = _start(batch, model, plan, desired, errors)
+    bounds = case.bounds()
+    drag = drag_wrench(attached.body, attached.controller, *told[:2])
+    depth = 0.0
+    if case.chosen and rows is not None:
+        first = _load(attached.controller, LawControl(attached.controller, told, bounds, drag), told)
+        depth = float(rows.depth(np.array(first / rows.points)))
+    _start(batch, model, plan, desired, errors, depth)
     start = (np.array(batch.bind("qpos")), np.array(batch.bind("qvel")))
     for values in start:
         values.flags.writeable = False
 
-    bounds = case.bounds()
-    control: Control = LawControl(attached.controller, told, bounds)
+    control: Control = LawControl(attached.controller, told, bounds, drag)
     horizons = played = None
+    if attached.body.drag is not None and (open_loop or case.plan_hz is not None):
+        raise ModelError(f"body = {attached.body.name!r}: a plan knows no joint damping or friction; must have none")
     if open_loop:
         control = played = play_control(case, attached, believed, follow, dt, steps)
     elif case.plan_hz is not None:
@@ -119,14 +139,17 @@ def simulate(
         near=NEAR * body_size(model, truth.index),
         landing=case.limits.contacts_end > 0,
     )
-    contacts = ContactLog(declared, where, steps, int(worlds))
-    log = run_steps(batch, control, attached.controller, contacts, truth.index, where, steps, progress)
+    contacts = ContactLog(declared, rows, matrix(truth.table), where, steps, int(worlds))
+    with engine_log() as warned:
+        log = run_steps(batch, control, attached.controller, contacts, truth.index, where, steps, progress)
     axes = matrix(truth.table) @ space(d).force_map
     return Run(
-        scenario=case,
+        scenario=asked,
         seed=int(seed),
         attached=attached,
+        load=believed.load,
         replaced=world.replaced,
+        settings=settings,
         model=model,
         truth=truth,
         declared=declared,
@@ -149,6 +172,7 @@ def simulate(
         force=log.answers.force.reshape(worlds, steps, K, d),
         force_measured=frozen(log.contacts.force @ axes),
         contacts=log.contacts,
+        held=log.held,
         residual=log.answers.residual,
         status=log.answers.status,
         control_us=frozen(log.control_ns / (1e3 * worlds)),
@@ -156,16 +180,52 @@ def simulate(
         plan=None if played is None else played.plan,
         plans=None if horizons is None else horizons.log,
         events=() if horizons is None else tuple(horizons.events),
+        engine_warnings=tuple(warned),
         controller="scenario" if controller is None else "given",
     )
 
 
+def _instrumented(world: Scene) -> tuple[mujoco.MjModel, dict[str, slice]]:
+    """The model that is simulated, and where each reading is in its sensordata."""
+    model, where = instrument(world)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that diverges is seen, not reset
+    # bodies of several geoms: a plane's bounding box is 5e9 m deep there, and misses contacts of less than 1e-6 m
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+    return model, where
+
+
+def _pressed(model: mujoco.MjModel, plan: Plan, orientations: Array) -> Iterator[Array]:
+    """The qpos of the object pressed on its contact at each of these orientations (S, 4)."""
+    data, up, point = initial_data(model), matrix(plan.body.table)[:, 2], plan.contacts[0]
+    lever = float(np.linalg.norm(plan.body.com - point) + plan.radius[0])
+    for orientation in orientations:
+        place(model, data, plan.body, orientation, point, plan.at + (plan.radius[0] - PRESSED * lever) * up)
+        yield np.array(data.qpos)
+
+
+def _load(controller: WrenchController, law: LawControl, told: Samples) -> float:
+    """The normal force [N] on all contacts with which the law begins."""
+    states = States(np.zeros((1, 3)), told[0][:1], np.zeros((1, 3)), told[1][:1])
+    nw, d, K = len(controller.Q_w), controller.space.dim, len(controller.contacts)
+    out = Answers(np.empty((1, nw)), np.empty((1, nw)), np.empty((1, K * d)), np.empty(1), np.empty(1, np.int8))
+    law(0, states, None, out)
+    return float(out.force.reshape(K, d)[:, -1].sum())
+
+
 def _start(
-    batch: Batch, model: mujoco.MjModel, plan: Plan, desired: tuple[Array, Array, Array], errors: Array
-) -> ContactRows | None:
-    """Put every world on its contact, off the reference by `errors` (W,) [rad]; its contact rows.
+    batch: Batch,
+    model: mujoco.MjModel,
+    plan: Plan,
+    desired: tuple[Array, Array, Array],
+    errors: Array,
+    depth: float,
+) -> None:
+    """Put every world on its contact, off the reference by `errors` (W,) [rad].
 
     Everything else is where the model's first keyframe, or else qpos0, has it.
+
+    Args:
+        depth: at which it rests under its load; one that has less to carry at first would slide [m].
 
     Raises:
         ModelError: the object would touch something else there; it is named.
@@ -173,11 +233,12 @@ def _start(
     body = plan.body
     data, up, point = initial_data(model), matrix(body.table)[:, 2], plan.contacts[0]
     lever = float(np.linalg.norm(body.com - point) + plan.radius[0])
+    depth = float(np.clip(depth, START_DEPTH * lever, DEEPEST * lever))
     kind, floats = int(mujoco.mjtState.mjSTATE_INTEGRATION), 0.0
     state = np.empty(mujoco.mj_stateSize(model, kind))
     for row, error in zip(batch.state, errors, strict=True):
         for _ in range(2):  # a contact with a margin holds the body above the table: how far, only MuJoCo knows
-            at = plan.at + (plan.radius[0] + floats - START_DEPTH * lever) * up
+            at = plan.at + (plan.radius[0] + floats - depth) * up
             place(model, data, body, quaternion_product(exponential(error * plan.axis), desired[0][0]), point, at)
             touching = point - plan.radius[0] * up @ data.xmat[body.index].reshape(3, 3)
             turn(model, data, body, desired[1][0], touching)
@@ -187,7 +248,6 @@ def _start(
         refuse_strays(model, data, body)
         mujoco.mj_getState(model, data, state, kind)
         row[:] = state
-    return read_rows(model, data, body.index, body.support)
 
 
 def believe(
@@ -200,15 +260,10 @@ def believe(
     case = replace(case, body=believed.body, support=believed.support)
     plan = planned(case, nominal)
     if controller is not None:
-        if not isinstance(controller, WrenchController):
-            raise fail("controller", controller, "a WrenchController")
-        if [contact.dim for contact in controller.contacts] != [plan.body.dim] * len(plan.contacts):
-            kind = "planar" if plan.body.dim == 2 else "spatial"
-            given = f"one with {len(controller.contacts)} contacts in dimension {controller.space.dim}"
-            raise fail("controller", given, f"of {len(plan.contacts)} {kind} contact{'s' * (len(plan.contacts) > 1)}")
-        ignored = [key for key in CONTROL_KEYS if key in case.changes]
-        if ignored:
-            raise fail(ignored[0], case.changes[ignored[0]], "left out: the controller that is given has its own")
+        _check(controller, case, plan)
+    if plan.load.force == 0.0 and (case.f_min if controller is None else controller.belief.f_min.max()) == 0.0:
+        raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the object on its support")
+    if controller is not None:
         return Attached(nominal, plan.body, controller), plan
     attached = attach(
         nominal,
@@ -218,14 +273,30 @@ def believe(
         law=case.control_law(),
         mu=case.mu,
         margin=case.margin,
-        f_min=case.f_min,
+        f_min=float(case.absolute(plan.load).f_min),
         Q_w=case.wrench_weight(plan.body.dim),
         support=case.support,
     )
     return attached, plan
 
 
-Samples = tuple[Array, Array, Array]
+def _check(controller: WrenchController, case: Scenario, plan: Plan) -> None:
+    """Refuse a controller that is not of these contacts, or that the loop would not ask."""
+    if not isinstance(controller, WrenchController):
+        raise fail("controller", controller, "a WrenchController")
+    if [contact.dim for contact in controller.contacts] != [plan.body.dim] * len(plan.contacts):
+        kind = "planar" if plan.body.dim == 2 else "spatial"
+        given = f"one with {len(controller.contacts)} contacts in dimension {controller.space.dim}"
+        raise fail("controller", given, f"of {len(plan.contacts)} {kind} contact{'s' * (len(plan.contacts) > 1)}")
+    for name in ("problem", "jacobian"):
+        if getattr(getattr(controller, name), "__func__", None) is not getattr(WrenchController, name):
+            allowed = (
+                f"without a {name}() of its own: the compiled loop states the problems of all worlds from `belief`"
+            )
+            raise fail("controller", type(controller).__name__, allowed + ", and would never call it")
+    ignored = [key for key in CONTROL_KEYS if key in case.changes]
+    if ignored:
+        raise fail(ignored[0], case.changes[ignored[0]], "left out: the controller that is given has its own")
 
 
 def _desired(case: Scenario, plan: Plan, time: Array) -> tuple[Samples, Samples, Turn]:

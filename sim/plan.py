@@ -7,14 +7,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product
-from pivoting.models.candidates import NEAR, planar_stance, stance, support_points
+from pivoting.models.candidates import planar_stance, stance
 from pivoting.models.frames import matrix, quaternion
+from pivoting.models.given import NEAR
+from pivoting.models.grip import holds
 from pivoting.models.naming import ModelError, label
 from pivoting.models.reading import RigidBody, file_frame, initial_data, read_body
+from pivoting.models.tilt import Arc
 from pivoting.sim.keys import LOWEST
+from pivoting.sim.relative import Load, load
 from pivoting.sim.scenario import Scenario
 
 Array = NDArray[np.float64]
+SAMPLES = 2001  # of a motion, to see how far it goes
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +45,12 @@ class Plan:
     start: Array
     range: tuple[float, float]
     face: Array
+
+    @property
+    def load(self) -> Load:
+        """What values of the scenario may be relative to."""
+        points = np.array([self.body.point(contact) for contact in self.contacts])
+        return load(self.body.mass, self.body.gravity, points, self.radius)
 
 
 def planned(case: Scenario, model: mujoco.MjModel) -> Plan:
@@ -86,7 +97,17 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
     contact = case.contact
     if not isinstance(contact, str):
         contact = _in_body_frame(contact, file_frame(model, body.index))
-    found = stance(model, body.index, contact, quaternion(now), body.table)
+    origin, axes = file_frame(model, body.index)
+    found = stance(
+        model,
+        body.index,
+        contact,
+        quaternion(now),
+        body.table,
+        arc=None if case.about == "yaw" else _arc(case),
+        holds=holds(model, body),
+        shown=lambda points: (points - origin) @ axes,
+    )
     start, axis = table @ found.rotation, table @ found.axis
     low, high = found.range
     lands = case.limits.contacts_end > 0
@@ -97,8 +118,18 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
     # the object starts where its file has it: the first contact is put under the place that it has there
     there = data.xpos[body.index] + now @ found.points[0] - body.origin
     at = body.origin + there - (there @ table[:, 2]) * table[:, 2]
-    face = support_points(model, body.index, -found.rotation[2])
-    return Plan(body, found.points, found.radius, at, axis, quaternion(start), limits, face)
+    return Plan(body, found.points, found.radius, at, axis, quaternion(start), limits, found.face)
+
+
+def _arc(case: Scenario) -> Arc | None:
+    """The angles of the scenario's motion, first that at which it begins; None if it gives no angles."""
+    time = np.linspace(0.0, case.duration, SAMPLES)
+    angle = np.array(case.motion(time)[0], dtype=float)
+    if angle.shape != time.shape or not np.isfinite(angle).all():
+        return None
+    low, high = float(angle.min()), float(angle.max())
+    ends = (low, high) if angle[0] - low <= high - angle[0] else (high, low)
+    return Arc(*ends, np.deg2rad(LOWEST), case.limits.contacts_end > 0)
 
 
 def _in_body_frame(points: ArrayLike, frame: tuple[Array, Array]) -> ArrayLike:
@@ -113,7 +144,7 @@ def _in_body_frame(points: ArrayLike, frame: tuple[Array, Array]) -> ArrayLike:
 def _planar(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
     """In the plane the contact is the left end of the face that is down at theta = 0, unless it is given."""
     axes, table, gap = matrix(body.axes), matrix(body.table), np.deg2rad(LOWEST)
-    point, radius, most = planar_stance(model, body.index, case.contact, axes)
+    point, radius, most = planar_stance(model, body.index, case.contact, axes, arc=_arc(case))
     face = point - radius * axes[:, 2]
     limits = (gap, most - gap)
     return Plan(body, point[None], np.array([radius]), body.origin, -table[:, 1], body.table, limits, face[None])

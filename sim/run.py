@@ -11,25 +11,37 @@ from pivoting.controller.plan import Plan
 from pivoting.controller.so3 import rotated
 from pivoting.controller.space import CONJUGATE, Space, quaternion_product, space
 from pivoting.controller.units import lever
+from pivoting.models.contact_settings import ContactSettings
 from pivoting.models.frames import matrix
 from pivoting.models.naming import label
 from pivoting.models.reading import RigidBody
+from pivoting.sim.advice import reasons, remedies
 from pivoting.sim.attach import Attached
 from pivoting.sim.contact_readings import ContactReadings, Declared
 from pivoting.sim.control import BOUNDED, Event, PlanLog, plan_figures
-from pivoting.sim.fidelity import ContactRows
-from pivoting.sim.monitor import Measures, measure
+from pivoting.sim.fidelity import ContactRows, Held, stepped_point
+from pivoting.sim.monitor import Measures, measure, slip_floor_unknown
+from pivoting.sim.relative import Load
 from pivoting.sim.scenario import Scenario
 from pivoting.sim.strays import stray_words
-from pivoting.sim.verdict import Check, Limits, judge
+from pivoting.sim.verdict import Check, Limits, judge, worst_world
 
 Array = NDArray[np.float64]
+_CHOSEN = ("contacts", "coupling", "reason")  # of the contact settings, what the model itself does not say
 
 
 def frozen(values: Array) -> Array:
     """What is measured cannot be changed before it is judged."""
     values.flags.writeable = False
     return values
+
+
+def _freeze(values: Any) -> None:
+    if isinstance(values, np.ndarray):
+        values.flags.writeable = False
+    elif isinstance(values, tuple):
+        for value in values:
+            _freeze(value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,14 +52,16 @@ class Run:
         scenario: what was run, overrides included.
         seed: of the worlds' initial errors.
         attached: the controller and what it believes.
+        load: what the scenario's relative values are relative to.
         model: the world's, with the sensors of the loop.  truth: the body as that has it.
         replaced: what of the file gave way to the settings of the shipped scenes: name, and what it was.
+        settings: contact parameters that were chosen for the object, if they were.
         declared: the contacts that are to stick, as the world has them.
         radius: (K,) of what rolls, else 0 [m].
         face: (P, 3) likewise, the corners of the face that the object lies on at angle 0.
         turn: the axis (3,) [world axes] and the orientation (4,) at angle 0 that `theta` is counted from.
         mu_world: the world's friction.
-        contact_rows: MuJoCo's contact at the start, for the predicted slip.
+        contact_rows: MuJoCo's contacts with the support, for the predicted slip.
         start: qpos (W, nq) and qvel (W, nv) of the worlds at time 0, from which the applied wrenches replay the run.
         time: (N+1,) [s].
         reference: desired angle, rate and acceleration, each (N+1,) [rad, s].
@@ -60,22 +74,25 @@ class Run:
         wrench_world: (W, N, 6) applied force and torque at the CoM, world axes.
         force: (W, N, K, d) contact forces (f_t, f_n) or (f_t, f_o, f_n) predicted by the solution, table axes [N].
         force_measured: (W, N, K, d) by MuJoCo's contacts, likewise.
-        contacts: what else they say, see `ContactReadings`.
+        contacts: what else they say, see `ContactReadings`; held: what their rows do, see `Held`.
         residual: (W, N) relative KKT residuals.
         status: (W, N) codes of `solution.STATUS`; 0 is solved, 3 as far as the bounds allowed.
         control_us: (N,) time to state, solve and certify the problem of one world [microseconds].
         wall_s: of the loop.
         plan: that was played in open loop, else None.
         plans: of a receding horizon, what came of each; else None.  events: what a user has to know of.
+        engine_warnings: what MuJoCo warned of, as of a world that diverges: each once, with its first time.
         controller: "scenario" for the scenario's own, "given" for another that was handed to `simulate`.
     """
 
     scenario: Scenario
     seed: int
     attached: Attached
+    load: Load
     model: mujoco.MjModel
     truth: RigidBody
     replaced: tuple[tuple[str, str], ...]
+    settings: ContactSettings | None
     declared: Declared
     radius: Array
     face: Array
@@ -96,6 +113,7 @@ class Run:
     force: Array
     force_measured: Array
     contacts: ContactReadings
+    held: Held
     residual: Array
     status: NDArray[np.int8]
     control_us: Array
@@ -103,7 +121,13 @@ class Run:
     plan: Plan | None
     plans: PlanLog | None
     events: tuple[Event, ...]
+    engine_warnings: tuple[str, ...]
     controller: str
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """From pickle, which forgets that arrays are read-only."""
+        vars(self).update(state)
+        _freeze(tuple(state.values()))
 
     @property
     def points(self) -> Array:
@@ -170,6 +194,12 @@ class Run:
     def lever(self) -> Array:
         """(W, N+1, K, 3) from the CoM to where the contacts touch, table axes [m]."""
         return frozen(self.turning - self._up)
+
+    @cached_property
+    def stepped(self) -> Array:
+        """(W, N+1, 3) from the CoM to the point of the body whose velocity MuJoCo steps, table axes [m]."""
+        point = stepped_point(self.model, self.truth.index) - self.truth.com
+        return frozen(self._from_com(point[None] @ matrix(self.truth.axes))[..., 0, :])
 
     @cached_property
     def corner(self) -> Array:
@@ -248,6 +278,11 @@ class Run:
         """Indices of the worlds that fail any check."""
         return np.flatnonzero(np.any([check.failed for check in self.checks], axis=0))
 
+    @cached_property
+    def worst_world(self) -> int:
+        """The one in which a measured value is the greatest multiple of its limit."""
+        return worst_world(self)
+
     @property
     def verdict(self) -> str:
         """ "pass" if every world is within every limit of the scenario, else "fail"."""
@@ -263,24 +298,30 @@ class Run:
             "contacts": self.points.tolist(),
             "radius": self.radius.tolist(),
             "changes": self.scenario.changes,
+            "resolved": self.scenario.resolved(self.load),
             "limits": asdict(self.limits),
             "controller": self.controller,
             "seed": self.seed,
             "worlds": self.worlds,
             "verdict": self.verdict,
             "failed_worlds": self.failed_worlds.tolist(),
+            "worst_world": self.worst_world,
             **worst,
+            "slip_floor_unknown": slip_floor_unknown(self) or None,
             "solve_us_median": float(np.median(self.control_us)),
             "solve_us_p99": float(np.quantile(self.control_us, 0.99)),
             "sim_s": float(self.time[-1]),
             "wall_s": self.wall_s,
             "real_time_factor": self.worlds * float(self.time[-1]) / self.wall_s,
             "bounded_steps": int(np.count_nonzero(self.status == BOUNDED)),
+            "reasons": reasons(self),
+            "remedies": [remedy.setting for remedy in remedies(self)],
             "undeclared_contacts": self.strays,
             "support": label(self.model, self.truth.support).strip("'"),
             "object": self.object,
             "contact_settings": self.contact_settings,
             "events": [event._asdict() for event in self.events],
+            "engine_warnings": list(self.engine_warnings),
             **({} if self.plans is None else plan_figures(self.plans)),
             **({} if self.plan is None else {"plan_angle_error_max_deg": float(np.rad2deg(self.plan_error.max()))}),
         }
@@ -312,6 +353,7 @@ class Run:
             "impratio": float(opt.impratio),
             "cone": mujoco.mjtCone(int(opt.cone)).name.removeprefix("mjCONE_").lower(),
             "replaced": dict(self.replaced),
+            **({} if self.settings is None else {key: getattr(self.settings, key) for key in _CHOSEN}),
         }
 
     @cached_property

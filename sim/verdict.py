@@ -1,11 +1,12 @@
 """The verdict: explicit thresholds on what was measured, and assertions on them for anyone's tests."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.controller.validate import number
+from pivoting.controller.validate import fail, number
 
 if TYPE_CHECKING:
     from pivoting.sim.monitor import Measures
@@ -55,6 +56,26 @@ class Limits:
         fall = 0.5 * gravity * FALL**2 if gravity > 0.0 else np.inf
         return self if self.slip_m is not None else replace(self, slip_m=min(self.slip_rel * lever, fall))
 
+    def change(self, limits: "Limits | Mapping[str, float | str]") -> "Limits":
+        """These with other values, of a mapping from text if need be; or the limits that are given.
+
+        Raises:
+            ValueError: there is no such limit, or a value is not a number >= 0; it is named.
+        """
+        if isinstance(limits, Limits):
+            return limits
+        if not isinstance(limits, Mapping):
+            raise fail("limits", limits, 'Limits, or a mapping such as {"slip_m": 2e-3}')
+        new: dict[str, Any] = {}
+        for name, value in limits.items():
+            if name not in vars(self):
+                raise fail(f"limits.{name}", value, "a known limit: " + ", ".join(vars(self)))
+            try:
+                new[name] = float(value) if isinstance(value, str) else value
+            except ValueError:
+                raise fail(f"limits.{name}", value, "a number") from None
+        return replace(self, **new)
+
 
 @dataclass(frozen=True, eq=False)
 class Check:
@@ -96,6 +117,17 @@ def judge(measures: "Measures", limits: Limits) -> tuple[Check, ...]:
             "bounce_m": (measures.bounce_m, limits.bounce_m),
         }
     return tuple(Check(name, float(np.max(value)), limit, ~(value <= limit)) for name, (value, limit) in pairs.items())
+
+
+def worst_world(run: "Run") -> int:
+    """The world in which a value is the greatest multiple of its limit; what is not finite is beyond any."""
+    ratios = np.zeros(run.worlds)
+    for check in run.checks:
+        values = np.asarray(getattr(run.measures, check.name), dtype=float)
+        over = np.where(np.isfinite(values), values, np.inf)
+        over = over / check.limit if check.limit > 0.0 else np.where(over > 0.0, np.inf, 0.0)
+        ratios = np.maximum(ratios, over)
+    return int(np.argmax(ratios))
 
 
 def assert_sticking(run: "Run", *, slip_m: float | None = None, contact_lost_s: float | None = None) -> None:

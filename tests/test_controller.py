@@ -114,18 +114,23 @@ def test_a_tolerance_that_is_not_met_is_a_status() -> None:
     assert stepped(BLOCK, q, omega, Motion(0.5), tolerance=-1.0).status.tolist() == [1]
 
 
-def test_kernels_compiled_before_an_edit_are_dropped(tmp_path: Path) -> None:
-    cache = tmp_path / "__pycache__"
+def test_kernels_compiled_of_other_sources_are_dropped(tmp_path: Path) -> None:
+    """Also where the new source is the older file, as an installer that keeps dates may leave it."""
+    cache = tmp_path / "cache"
     cache.mkdir()
     source, index, code = tmp_path / "law.py", cache / "law.f-1.py311.nbi", cache / "law.f-1.py311.1.nbc"
-    for path in (source, index, code):
+    source.write_text("mu = 1")
+    assert drop_stale_kernels(tmp_path, cache) == []
+    for path in (index, code):
         path.write_text("")
     os.utime(source, (100.0, 100.0))
-    assert drop_stale_kernels(tmp_path) == []
+    assert drop_stale_kernels(tmp_path, cache) == []
     assert index.exists()
-    os.utime(index, (50.0, 50.0))
-    assert set(drop_stale_kernels(tmp_path)) == {index, code}
-    assert list(cache.iterdir()) == []
+    source.write_text("mu = 2")
+    os.utime(source, (100.0, 100.0))
+    assert set(drop_stale_kernels(tmp_path, cache)) == {index, code}
+    assert drop_stale_kernels(tmp_path, cache) == []
+    assert not list(cache.glob("*.nb*"))
 
 
 @pytest.mark.parametrize(

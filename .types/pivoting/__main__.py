@@ -1,0 +1,1 @@
+../../pivoting/__main__.py

@@ -1,0 +1,117 @@
+"""Ctrl-C at any moment: one line, exit code 130, nothing half-written. Real signals, sent when a trace is seen."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from time import monotonic, sleep
+
+import pytest
+
+from tests.processes import started
+
+LINE = "pivoting: interrupted"
+
+
+def interrupted_when(seen: Callable[[], bool], process: subprocess.Popen[str], times: int = 1) -> list[str]:
+    """Send SIGINT once something is seen, so many times in a row; the lines of stderr, if it ended as it should."""
+    limit = monotonic() + 200.0
+    while not seen():
+        assert process.poll() is None, process.communicate()
+        assert monotonic() < limit
+        sleep(0.002)
+    for _ in range(times):
+        process.send_signal(signal.SIGINT)
+        sleep(0.005 if times > 1 else 0.0)
+    said, told = process.communicate(timeout=60)
+    assert process.returncode == 130, (process.returncode, told)
+    assert said == ""
+    lines = told.splitlines()
+    assert lines.count(LINE) == 1
+    assert lines[-1] == LINE
+    assert [line for line in lines if not line.startswith("pivoting: compiling")] == [LINE]
+    return lines
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks at /proc for what is loaded")
+@pytest.mark.parametrize("library", ["_multiarray_umath", "llvmlite", "libmujoco", "scipy"])
+def test_while_libraries_are_imported(library: str) -> None:
+    process = started("list")
+    maps = Path(f"/proc/{process.pid}/maps")
+    interrupted_when(lambda: library in maps.read_text(), process)
+
+
+@pytest.mark.parametrize("later", [0.0, 2.0])
+def test_while_kernels_are_compiled(tmp_path: Path, later: float) -> None:
+    """After which the cache is whole: the same call goes on from it."""
+    process = started("example", "--json", env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)})
+    assert process.stderr is not None
+    assert process.stderr.readline().startswith("pivoting: compiling")
+    sleep(later)
+    interrupted_when(lambda: True, process)
+
+
+@pytest.mark.parametrize("times", [1, 3])
+def test_in_the_loop(tmp_path: Path, times: int) -> None:
+    """Also if it is asked for three times at once: what was temporary is tidied up all the same."""
+    temporary, out = tmp_path / "temporary", tmp_path / "out"
+    temporary.mkdir()
+    words = ("run", "balance-2d", "--worlds", "64", "--set", "seconds=100", "--out", str(out))
+    process = started(*words, env={**os.environ, "TMPDIR": str(temporary)})
+    interrupted_when(lambda: bool(list(temporary.glob("pivoting-*"))), process, times)
+    assert list(temporary.iterdir()) == []
+    assert list(out.iterdir()) == []
+
+
+def test_while_results_are_written(tmp_path: Path) -> None:
+    """Neither of the two files, and nothing in their stead."""
+    process = started("run", "balance-2d", "--out", str(tmp_path))
+    interrupted_when(lambda: any(path.suffix == ".part" for path in tmp_path.iterdir()), process)
+    assert list(tmp_path.iterdir()) == []
+
+
+LIBRARY = """
+import ctypes, signal, sys, time
+from pivoting.__main__ import main
+
+def lost():  # in a callback out of C, where nothing can be raised
+    ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))()
+    time.sleep(100)
+
+def renamed():  # as C extensions do whose imports fail
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt:
+        raise ImportError("numpy.core.multiarray failed to import") from None
+
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == "mujoco":
+            {what}()
+
+sys.meta_path.insert(0, Finder())
+main()
+"""
+
+
+@pytest.mark.parametrize("what", ["lost", "renamed"])
+def test_whatever_a_library_makes_of_it(what: str) -> None:
+    call = [sys.executable, "-c", LIBRARY.replace("{what}", what), "list"]
+    done = subprocess.run(call, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout) == (130, "")
+    assert [line for line in done.stderr.splitlines() if not line.startswith("pivoting: compiling")] == [LINE]
+
+
+def test_a_job_in_the_background_is_left_alone() -> None:
+    """Where a shell has SIGINT ignored, it stays ignored."""
+    call = [sys.executable, "-m", "pivoting", "list"]
+    with subprocess.Popen(
+        call, stdout=subprocess.PIPE, text=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ) as process:
+        sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        told, _ = process.communicate(timeout=300)
+    assert process.returncode == 0
+    assert "pivot-2d" in told
