@@ -19,6 +19,7 @@ from pivoting.sim.relative import Load, load
 from pivoting.sim.scenario import Scenario
 
 Array = NDArray[np.float64]
+ANY = Load(1e-6, 1.0, 1e-6)  # so small that nothing that is relative to it is too large
 SAMPLES = 2001  # of a motion, to see how far it goes
 
 
@@ -120,10 +121,15 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
 
 
 def _arc(case: Scenario) -> Arc | None:
-    """The angles of the scenario's motion, first that at which it begins; None if it gives no angles."""
-    timed = case.absolute(Load(1.0, 1.0, 1.0))  # whatever the time that is relative: it changes no angle
-    time = np.linspace(0.0, timed.duration, SAMPLES)
-    angle = np.array(timed.motion(time)[0], dtype=float)
+    """The angles of the scenario's motion, first that at which it begins; None if it gives no angles.
+
+    How long it takes may be relative to where it turns, which is not yet known: that changes no angle.
+    """
+    if not isinstance(case.reference, str) and isinstance(case.seconds, str):
+        return None
+    case = case.absolute(ANY)
+    time = np.linspace(0.0, case.duration, SAMPLES)
+    angle = np.array(case.motion(time)[0], dtype=float)
     if angle.shape != time.shape or not np.isfinite(angle).all():
         return None
     low, high = float(angle.min()), float(angle.max())
