@@ -7,8 +7,8 @@ imported is kept off stdout.
 import os
 import signal
 import sys
-from _thread import interrupt_main
 from collections.abc import Callable
+from threading import Timer, get_ident
 from time import monotonic
 from types import FrameType
 from typing import Any, NoReturn
@@ -23,15 +23,17 @@ def main() -> NoReturn:
     interrupt = _Interrupt()
     code = 0
     try:
+        _open_streams()
         code = _command()()
         sys.stdout.flush()
-        interrupt.ignore()  # all is said and written
+        interrupt.ignore()
     except BrokenPipeError:
         _end_by_broken_pipe()
     except BaseException:
         if not interrupt.came:
             raise
     if interrupt.came:  # whatever the libraries on the way made of it
+        interrupt.ignore()
         print("pivoting: interrupted", file=sys.stderr, flush=True)
         os._exit(130)  # libraries that are imported by half need not survive their own tidying up
     sys.exit(code)
@@ -48,7 +50,7 @@ class _Interrupt:
             signal.signal(signal.SIGINT, self._handle)
 
     def ignore(self) -> None:
-        """From here on there is nothing left to interrupt."""
+        """From here on: all is said and written, or tidied up."""
         signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
@@ -60,10 +62,18 @@ class _Interrupt:
         raise KeyboardInterrupt
 
     def _again(self, lost: Any) -> None:
-        """Raised in a callback or finalizer it would be lost: it comes again, after that."""
+        """Raised in a callback or finalizer it would be lost: it comes again, when that is over."""
         if issubclass(lost.exc_type, KeyboardInterrupt):
             self._last = -1.0
-            interrupt_main()
+            Timer(0.01, signal.pthread_kill, (get_ident(), signal.SIGINT)).start()
+
+
+def _open_streams() -> None:
+    """Where stdout or stderr is closed the next file that is opened would be in its place, and get what is printed."""
+    for name, descriptor in (("stdout", 1), ("stderr", 2)):
+        if getattr(sys, name) is None:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)
+            setattr(sys, name, open(descriptor, "w", closefd=False))  # noqa: SIM115
 
 
 def _command() -> Callable[[], int]:
