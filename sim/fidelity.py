@@ -66,8 +66,8 @@ class ContactRows(NamedTuple):
         return self.pyramidal, self.D, self.b, self.k, self.solimp, self.margin
 
     @property
-    def R_n(self) -> float:
-        """Regularisation of the normal row as it just touches [1/kg]."""
+    def regularisation(self) -> float:
+        """R of the normal row of a contact that just touches [1/kg]."""
         return float(self.D[0] * self.softness(np.array(0.0)))
 
     def impedance(self, depth: Array) -> Array:

@@ -25,10 +25,8 @@ def unseen(run: "Run") -> Array | None:
     """(W, N, K, 2) acceleration along the table (t, o) of what touches, beside its rows [m/s^2]; None for none."""
     body, opt = run.truth, run.model.opt
     gyroscopic = int(opt.integrator) == IMPLICIT or (int(opt.integrator) == FAST and body.dim == 3)
-    explicit = int(opt.integrator) not in (IMPLICIT, FAST) and opt.disableflags & int(
-        mujoco.mjtDisableBit.mjDSBL_EULERDAMP
-    )
-    damped = body.drag is not None and not explicit
+    euler = int(opt.integrator) not in (IMPLICIT, FAST)
+    damped = body.drag is not None and not (euler and opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP))
     if not (gyroscopic or damped):
         return None
     to_world, to_object = run.quaternion, run.quaternion * CONJUGATE
