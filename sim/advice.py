@@ -196,8 +196,7 @@ def _floors(case: _Case) -> Iterator[float]:
     if rows is not None:
         w = run.angular_velocity[i] @ run.table_axes
         c_n = float(np.nanmax(np.abs(np.cross(w[:, None], np.cross(w[:, None], run.turning[i]))[..., 2]), initial=0.0))
-        R_n = float(rows.D[0] * rows.softness(np.zeros(())))
-        opening = c_n * max(1.0 - 0.5 * rows.b * rows.h, 0.0) / R_n * rows.points / K
+        opening = c_n * max(1.0 - 0.5 * rows.b * rows.h, 0.0) / rows.regularisation * rows.points / K
         some |= {2.0 * opening}
     some |= {1.5 * error * (1.0 + run.mu_world) / spare}
     least = max(1.2 * float(run.attached.controller.belief.f_min.min()), 0.05 * case.weight / K)
