@@ -127,7 +127,7 @@ ALL = "import pivoting, pivoting.controller, pivoting.models, pivoting.sim; prin
 @pytest.mark.parametrize("where", ["root", "elsewhere"])
 @pytest.mark.parametrize("how", ["installed", "bare"])
 def test_the_rooms_are_found(where: str, how: str, tmp_path: Path) -> None:
-    """From the root, where python finds the folder pivoting/ itself, and from elsewhere; installed, editable, or not."""
+    """From the root, where python finds the folder pivoting/ itself, and from elsewhere; editable, or not installed."""
     folder = ROOT if where == "root" else tmp_path
     environment = dict(os.environ)
     flags: list[str] = []
