@@ -1,4 +1,4 @@
-"""Whether a body has a contact to be tilted about, by turning it in steps: a second implementation, of nothing else here.
+"""Whether a body has a contact to be tilted about, found by turning it in steps: a second implementation.
 
 What touches a table is the convex hull of a body's colliding geoms. Every face of it is laid on the table in turn, and
 the body is turned off that about each corner and each edge of the face, in steps, each time with the heights of all
@@ -114,7 +114,8 @@ class Face(NamedTuple):
 class Body:
     """A body's hull, its faces, and the search for contacts about which it can be tilted."""
 
-    def __init__(self, model: mujoco.MjModel, index: int):
+    def __init__(self, model: mujoco.MjModel, index: int, arc: tuple[float, float] = ARC):
+        self.arc = arc
         every = surface(model, index)
         globe = _globe(1500)
         clouds = [c + r * globe if r else c[None] for c, r in zip(every.points, every.radius, strict=True)]
@@ -216,7 +217,7 @@ class Body:
         flat = [aim - (aim @ up) * up for aim in aims]
         ways = np.concatenate([ways, *[aim[None] / np.linalg.norm(aim) for aim in flat if np.linalg.norm(aim) > 1e-9]])
         own = (s.piece == s.piece[v]) | (np.linalg.norm(s.points - point, axis=1) <= OWN * self.size * (kind == CORNER))
-        for theta in np.deg2rad([ARC[0] + SLACK, ARC[1] - SLACK]):  # most ways fail at once
+        for theta in np.deg2rad([self.arc[0] + SLACK, self.arc[1] - SLACK]):  # most ways fail at once
             heights = s.heights(np.cos(theta) * up + np.sin(theta) * ways)
             ways = ways[(heights - heights[:, [v]]).min(axis=1) >= -TOLERANCE * self.size]
         return best(self._arc(up, way, v, own) for way in ways)
@@ -264,7 +265,7 @@ class Body:
         tolerance = TOLERANCE * self.size
 
         def above(slack: float) -> tuple[float, float]:
-            theta = np.deg2rad(np.linspace(ARC[0] - slack, ARC[1] + slack, 25))[:, None]
+            theta = np.deg2rad(np.linspace(self.arc[0] - slack, self.arc[1] + slack, 25))[:, None]
             heights = self.surface.heights(np.cos(theta) * up + np.sin(theta) * way)
             heights -= heights[:, [v]]
             others = heights[:, ~own]
@@ -277,7 +278,7 @@ class Body:
         return "borderline" if min(others, mine) >= -tolerance else "no"
 
     def lowest(self, up: Array) -> str:
-        """Whether it can be tilted about what touches the table in the orientation with this normal, body frame (3,)."""
+        """Whether it can be tilted about what touches the table where its normal is `up` (3,), body frame."""
         found = {self._lowest(up, tolerance) for tolerance in (0.1 * TOLERANCE, TOLERANCE, 10.0 * TOLERANCE)}
         return found.pop() if len(found) == 1 else "borderline"
 
@@ -311,13 +312,18 @@ def _com(model: mujoco.MjModel, index: int) -> Array:
     return (data.subtree_com[index] - data.xpos[index]) @ data.xmat[index].reshape(3, 3)
 
 
-def contacts(model: mujoco.MjModel, name: str) -> dict[str, str]:
-    """For "vertex", "edge" and "lowest" whether the body has such a contact: "yes", "borderline" or "no"."""
+def contacts(model: mujoco.MjModel, name: str, arc: tuple[float, float] = ARC) -> dict[str, str]:
+    """For "vertex", "edge" and "lowest" whether the body has such a contact: "yes", "borderline" or "no".
+
+    Args:
+        model: with the body in its place.  name: of the body.
+        arc: [deg] off the face.
+    """
     index = model.body(name).id
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     try:
-        body = Body(model, index)
+        body = Body(model, index, arc)
     except Exception as error:  # Qhull has its own
         raise ValueError(f"{name}: no hull ({error})") from error
     up = data.xmat[index].reshape(3, 3)[2]

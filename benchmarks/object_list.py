@@ -4,8 +4,8 @@ The rule. Of each package the files that its line in `PACKAGES` names are read: 
 MJCF file that MuJoCo compiles as it is gives its rigid things: what has a free joint, or, in a file without any joint,
 whatever stands on the world; with all that hangs on it rigidly, if something of it collides. A mesh is a thing of the
 density of water, if MuJoCo compiles it so. What has no volume (planes, height fields), or is moved by hand (mocap), is
-none. They are shuffled by the seed, and the first `EACH` are taken that MuJoCo compiles alone and that are no copies: of
-the type, mass, inertia and extent of one before. The rule knows nothing of controllers, nor of what can be tilted.
+none. They are shuffled by the seed, and the first `EACH` taken that MuJoCo compiles alone and that are no copies, of
+the types, mass, inertia and extent of one before. The rule knows nothing of controllers, nor of what can be tilted.
 
     python benchmarks/object_list.py      draws again: benchmarks/objects.json has to come out as it is
 """

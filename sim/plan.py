@@ -95,10 +95,8 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
     table, gap = matrix(body.table), np.deg2rad(LOWEST)
     data = initial_data(model)
     now = data.xmat[body.index].reshape(3, 3)
-    contact = case.contact
-    if not isinstance(contact, str):
-        contact = _in_body_frame(contact, file_frame(model, body.index))
     origin, axes = file_frame(model, body.index)
+    contact = case.contact if isinstance(case.contact, str) else _in_body_frame(case.contact, (origin, axes))
     found = stance(
         model,
         body.index,
