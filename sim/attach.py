@@ -126,7 +126,7 @@ def attach(
         margin: share of mu kept unused; exactly on the cone's edge nothing sticks.
         f_min: floor of the normal force [N].
         Q_w, Q_f: weights, see `WrenchProblem`; Q_w defaults to the lever of the contact as characteristic length.
-        support: name of the geom that the body stands on; default the model's only plane.
+        support: name of the geom that the body stands on; default what is under it in the first keyframe, or at qpos0.
 
     Raises:
         ModelError: the model cannot be served, with the reason.

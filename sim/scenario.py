@@ -32,7 +32,7 @@ class Scenario:
     Attributes:
         name, summary: shown by `pivoting list`.
         scene: name of an MJCF file in models/, or the path of one of your own.
-        body, support: names of the object and of the geom that it stands on (None: the only plane).
+        body, support: names of the object and of the geom that it stands on (None: what is under it).
         contact: what stays put: "corner" (planar scenes), "vertex", "edge", "lowest", or points (K, 3), body frame,
             see `models.candidates.stance`.
         chosen: whether the object's own contact and solver parameters give way to those of the shipped scenes.
