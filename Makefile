@@ -65,10 +65,13 @@ clean:  ## remove everything that was made
 	rm -rf .venv .venv-latest .venv-lock out build dist *.egg-info
 
 # Nothing is asked of a package registry but the files that the lock names, by their hashes.
-$(STAMP): pyproject.toml lock/dev.txt
+.venv/.locked: lock/dev.txt
 	$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 15) and "python 3.11 to 3.14 is needed: make PYTHON=...")'
 	$(PYTHON) -m venv --clear .venv
 	$(BIN)/$(PIP) --require-hashes --only-binary :all: --requirement lock/dev.txt
+	@touch $@
+
+$(STAMP): .venv/.locked pyproject.toml
 	$(BIN)/$(PIP) --no-index --no-deps --no-build-isolation --editable .
 	@touch $@
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from pivoting.models.contact_settings import STIFF, ContactSettings
 from pivoting.models.frames import Array
 from pivoting.models.friction import contact_friction, read_friction
 from pivoting.models.naming import ModelError, body_id
@@ -17,7 +18,6 @@ from pivoting.models.supports import can_collide, find_support
 BODY, TABLE = "block", "table"  # names in the scenes
 WORLD_KEYS = ("mu", "mass", "size", "incline", "gravity", "dt", "timeconst", "impedance", "impratio")
 
-STIFF = 2.1  # time constant of the contacts, in time steps: see settings.xml
 INERTIA_FROM_GEOM = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
 
 
@@ -77,8 +77,7 @@ class Scene:
             ModelError: the file has nothing that a key could change.
         """
         spec, wanted = self.spec.copy(), dict(changes)
-        geoms, table = list(spec.body(self.body).find_all(mujoco.mjtObj.mjOBJ_GEOM)), spec.geom(self.support)
-        parts = [*geoms, table, *_pairs(spec, geoms)]
+        geoms, table, parts = self._parts(spec)
         if "dt" in wanted:
             wanted.setdefault("timeconst", STIFF * wanted["dt"])
             spec.option.timestep = wanted["dt"]
@@ -103,6 +102,21 @@ class Scene:
         if spec.option.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
             _override(spec.option, wanted)
         return replace(self, spec=spec, mass=wanted.get("mass", self.mass), scale=self.scale * scale)
+
+    def with_contacts(self, settings: ContactSettings) -> "Scene":
+        """This scene with these contact parameters of the body and its support."""
+        spec = self.spec.copy()
+        solref = settings.timeconst, settings.dampratio
+        for part in self._parts(spec)[2]:
+            part.solref[:2], part.solimp[:2] = solref, settings.impedance
+        if spec.option.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
+            spec.option.o_solref[:2], spec.option.o_solimp[:2] = solref, settings.impedance
+        return replace(self, spec=spec)
+
+    def _parts(self, spec: mujoco.MjSpec) -> tuple[list[Any], Any, list[Any]]:
+        """Of a spec of this scene: the body's geoms, the support, and all that has parameters of their contacts."""
+        geoms, table = list(spec.body(self.body).find_all(mujoco.mjtObj.mjOBJ_GEOM)), spec.geom(self.support)
+        return geoms, table, [*geoms, table, *_pairs(spec, geoms)]
 
 
 def load(

@@ -145,15 +145,24 @@ def run(
 
     from pivoting.sim.report import jsonable, print_run
 
+    also: dict[str, Any] = {}
+    if finished.verdict == "fail" and not open_loop:
+        from pivoting.sim.advice import tried
+
+        also["holds"] = tried(finished, simulate)
     saved = None
     if folder is not None:  # before it is told: who is told may have gone
         from pivoting.sim.results import save
 
-        saved = save(finished, folder, record_world)
+        saved = save(finished, folder, record_world, also=also)
     if as_json:
-        as_json(jsonable(finished.summary()) if saved is None else saved.summary)
+        as_json(jsonable({**finished.summary(), **also}) if saved is None else saved.summary)
     else:
         print_run(console(), finished)
+        if also.get("holds"):
+            click.echo(f"what would hold it: {also['holds']['setting']} ({also['holds']['why']}; tried, it passes)")
+        elif also:
+            click.echo("what would hold it was not found; `remedies` in the summary lists what its figures suggest")
     for line in () if saved is None else saved.said:
         click.echo(line)  # under --json on stderr, as all else
     return 1 if finished.verdict == "fail" else 0

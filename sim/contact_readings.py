@@ -36,6 +36,26 @@ class ContactReadings(NamedTuple):
     depth: Array
 
 
+class Listed(NamedTuple):
+    """What MuJoCo lists of the S contacts with the support; world axes, leading axes of steps and worlds.
+
+    Attributes:
+        there: (..., S) whether there is one.
+        share: (..., S, K) of a force on it that each declared contact carries; 0 of one that is not declared.
+        local: (..., S, 3) force on the object along its normal and both tangents [N].
+        normal, tangent: (..., S, 3) its normal and first tangent.
+        position: (..., S, 3) [m].  depth: (..., S) [m].
+    """
+
+    there: NDArray[np.bool_]
+    share: Array
+    local: Array
+    normal: Array
+    tangent: Array
+    position: Array
+    depth: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Declared:
     """The contacts that are declared to stick, on an object that moves.
@@ -75,25 +95,40 @@ class Declared:
         return np.eye(at.shape[-2])[away.argmin(axis=-1)], away.min(axis=-1)
 
 
-def read_contacts(listed: Array, touching: Array, at: Array, declared: Declared) -> ContactReadings:
+def list_contacts(sensed: Array, at: Array, declared: Declared) -> Listed:
+    """The contacts of the object with its support.
+
+    Args:
+        sensed: (N, W, S 14).
+        at: (N, W, K, 3) where the declared contacts are [world axes, m].
+    """
+    contacts = sensed.reshape(*sensed.shape[:2], -1, FIELDS)
+    there = contacts[..., 0] > 0.0
+    share, away = declared.shares(contacts[..., 5:8], at)
+    return Listed(
+        there=there,
+        share=np.where((there & (away <= declared.near))[..., None], share, 0.0),
+        local=contacts[..., 1:4],
+        normal=contacts[..., 8:11],
+        tangent=contacts[..., 11:14],
+        position=contacts[..., 5:8],
+        depth=-contacts[..., 4],
+    )
+
+
+def read_contacts(listed: Listed, found: Array, touching: Array, declared: Declared) -> ContactReadings:
     """Sort the contacts of the object.
 
     Args:
-        listed: (N, W, S 14) the contacts with the support.  touching: (N, W, 4) number and net force of all contacts.
-        at: (N, W, K, 3) where the declared contacts are [world axes, m].
+        listed: those with the support.  found: (N, W) how many there are.
+        touching: (N, W, 4) number and net force of all contacts.
     """
-    contacts = listed.reshape(*listed.shape[:2], -1, FIELDS)
-    there = contacts[..., 0] > 0.0
-    normal, tangent = contacts[..., 8:11], contacts[..., 11:14]
-    local = contacts[..., 1:4]
+    there, share, local, normal, tangent = listed[:5]
     force = local[..., :1] * normal + local[..., 1:2] * tangent + local[..., 2:3] * np.cross(normal, tangent)
-    share, away = declared.shares(contacts[..., 5:8], at)
-    ours = there & (away <= declared.near)
-    share = np.where(ours[..., None], share, 0.0)
-    others = there & ~ours
+    others = there & ~share.any(axis=-1)
     listed_force = np.where(there[..., None], force, 0.0).sum(axis=-2)
-    unlisted = contacts[..., 0].max(axis=-1) - there.sum(axis=-1)  # more contacts than slots
-    elsewhere = touching[..., 0] - contacts[..., 0].max(axis=-1)  # with other geoms than the support
+    unlisted = found - there.sum(axis=-1)  # more contacts than slots
+    elsewhere = touching[..., 0] - found  # with other geoms than the support
     rest = np.linalg.norm(touching[..., 1:4] - listed_force, axis=-1)
     size = np.linalg.norm(force, axis=-1)
     stray = np.where(elsewhere + unlisted > 0.0, rest, 0.0)
@@ -104,8 +139,8 @@ def read_contacts(listed: Array, touching: Array, at: Array, declared: Declared)
     return ContactReadings(
         force=np.einsum("nwsk,nwsi->nwki", share, force),
         points=(share > 0.0).sum(axis=2).astype(float),
-        found=contacts[..., 0].max(axis=-1),
+        found=found,
         stray=stray,
         strays=strays.astype(float),
-        depth=np.where(there, -contacts[..., 4], 0.0).max(axis=-1, initial=0.0),
+        depth=np.where(there, listed.depth, 0.0).max(axis=-1, initial=0.0),
     )

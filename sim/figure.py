@@ -39,7 +39,9 @@ def draw_solution_space(solution: Solution, path: str | os.PathLike[str], title:
 def _draw_wrenches(axes: Any, solution: Solution) -> None:
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    space = solution_space(solution, reach=1.7 * max(float(solution.force[0, 1]), 1e-9))
+    problem, force = solution.problem, solution.force[0]
+    given = problem.jacobian, float(problem.mu_planned[0]), float(problem.f_min[0]), problem.required
+    space = solution_space(*given, solution.wrench, force, reach=1.7 * max(float(force[1]), 1e-9))
     for polygon, colour in ((space.cone, ORANGE), (space.admissible, BLUE)):
         axes.add_collection3d(Poly3DCollection([polygon], facecolor=colour, edgecolor=colour, alpha=0.3))
     origin = np.zeros(3)

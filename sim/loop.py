@@ -1,6 +1,6 @@
 """A closed-loop run, from a scenario to what is measured: the world, the belief, the start, the steps."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from pivoting.controller.rotations import Turn
 from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product, space
 from pivoting.controller.validate import fail
+from pivoting.models.contact_settings import contact_settings
 from pivoting.models.frames import matrix
 from pivoting.models.friction import read_friction
 from pivoting.models.given import NEAR
@@ -23,9 +24,9 @@ from pivoting.models.sensors import instrument
 from pivoting.models.supports import body_size
 from pivoting.sim.attach import Attached, attach
 from pivoting.sim.contact_readings import Declared
-from pivoting.sim.control import BoundedControl, Control, LawControl
+from pivoting.sim.control import Answers, BoundedControl, Control, LawControl, States
 from pivoting.sim.engine_log import engine_log
-from pivoting.sim.fidelity import ContactRows, read_rows
+from pivoting.sim.fidelity import read_rows
 from pivoting.sim.joint_drag import drag_wrench
 from pivoting.sim.keys import CONTROL_KEYS
 from pivoting.sim.plan import Plan, planned, transplanted
@@ -38,6 +39,9 @@ from pivoting.sim.strays import contact_margin, refuse_strays
 
 Array = NDArray[np.float64]
 START_DEPTH = 1e-6  # of the lever from contact to CoM: there is contact from the first step on
+DEEPEST = 1e-2  # likewise, that an object is put at rest in its support
+PRESSED, SAMPLES = 1e-3, 17  # levers that it is pressed in, and where along its way, to see what it touches with
+Samples = tuple[Array, Array, Array]  # orientations, angular velocities and accelerations
 MAX_STEPS = 10_000_000  # worlds times steps that are kept in memory, about 0.5 kB each
 
 
@@ -78,10 +82,7 @@ def simulate(
     attached, believed = believe(case, controller, scene)
     asked, case = case, case.absolute(believed.load)
     world = scene.changed(case.actual)
-    model, where = instrument(world)
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that diverges is seen, not reset
-    # bodies of several geoms: a plane's bounding box is 5e9 m deep there, and misses contacts of less than 1e-6 m
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+    model, where = _instrumented(world)
     truth = read_body(model, world.body, world.support)
     plan = transplanted(believed, model, truth, world.scale / scene.changed(case.believed).scale)
     dt = float(model.opt.timestep)
@@ -100,16 +101,26 @@ def simulate(
     told, follow = _desired(case, believed, time)[1:]
     for values in (time, *reference, *desired):
         values.flags.writeable = False
+    pressed = list(_pressed(model, plan, desired[0][np.linspace(0, steps, SAMPLES).astype(int)]))
+    settings = None
+    if case.chosen and not {"timeconst", "impedance"} & set(case.actual):
+        settings = contact_settings(model, truth.index, truth.support, pressed, dt)
+        model, where = _instrumented(world.with_contacts(settings))
+    rows = read_rows(model, truth.index, truth.support, pressed)
 
     batch = Batch(model, int(worlds), nthread=1 if worlds == 1 else 0, persistent=True)
     errors = np.deg2rad(case.spread) * np.random.default_rng(seed).uniform(-1.0, 1.0, int(worlds))
-    rows = _start(batch, model, plan, desired, errors)
+    bounds = case.bounds()
+    drag = drag_wrench(attached.body, attached.controller, *told[:2])
+    depth = 0.0
+    if case.chosen and rows is not None:
+        first = _load(attached.controller, LawControl(attached.controller, told, bounds, drag), told)
+        depth = float(rows.depth(np.array(first / rows.points)))
+    _start(batch, model, plan, desired, errors, depth)
     start = (np.array(batch.bind("qpos")), np.array(batch.bind("qvel")))
     for values in start:
         values.flags.writeable = False
 
-    bounds = case.bounds()
-    drag = drag_wrench(attached.body, attached.controller, *told[:2])
     control: Control = LawControl(attached.controller, told, bounds, drag)
     horizons = played = None
     if attached.body.drag is not None and (open_loop or case.plan_hz is not None):
@@ -128,7 +139,7 @@ def simulate(
         near=NEAR * body_size(model, truth.index),
         landing=case.limits.contacts_end > 0,
     )
-    contacts = ContactLog(declared, where, steps, int(worlds))
+    contacts = ContactLog(declared, rows, matrix(truth.table), where, steps, int(worlds))
     with engine_log() as warned:
         log = run_steps(batch, control, attached.controller, contacts, truth.index, where, steps, progress)
     axes = matrix(truth.table) @ space(d).force_map
@@ -138,6 +149,7 @@ def simulate(
         attached=attached,
         load=believed.load,
         replaced=world.replaced,
+        settings=settings,
         model=model,
         truth=truth,
         declared=declared,
@@ -160,6 +172,7 @@ def simulate(
         force=log.answers.force.reshape(worlds, steps, K, d),
         force_measured=frozen(log.contacts.force @ axes),
         contacts=log.contacts,
+        held=log.held,
         residual=log.answers.residual,
         status=log.answers.status,
         control_us=frozen(log.control_ns / (1e3 * worlds)),
@@ -172,12 +185,47 @@ def simulate(
     )
 
 
+def _instrumented(world: Scene) -> tuple[mujoco.MjModel, dict[str, slice]]:
+    """The model that is simulated, and where each reading is in its sensordata."""
+    model, where = instrument(world)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that diverges is seen, not reset
+    # bodies of several geoms: a plane's bounding box is 5e9 m deep there, and misses contacts of less than 1e-6 m
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+    return model, where
+
+
+def _pressed(model: mujoco.MjModel, plan: Plan, orientations: Array) -> Iterator[Array]:
+    """The qpos of the object pressed on its contact at each of these orientations (S, 4)."""
+    data, up, point = initial_data(model), matrix(plan.body.table)[:, 2], plan.contacts[0]
+    lever = float(np.linalg.norm(plan.body.com - point) + plan.radius[0])
+    for orientation in orientations:
+        place(model, data, plan.body, orientation, point, plan.at + (plan.radius[0] - PRESSED * lever) * up)
+        yield np.array(data.qpos)
+
+
+def _load(controller: WrenchController, law: LawControl, told: Samples) -> float:
+    """The normal force [N] on all contacts with which the law begins."""
+    states = States(np.zeros((1, 3)), told[0][:1], np.zeros((1, 3)), told[1][:1])
+    nw, d, K = len(controller.Q_w), controller.space.dim, len(controller.contacts)
+    out = Answers(np.empty((1, nw)), np.empty((1, nw)), np.empty((1, K * d)), np.empty(1), np.empty(1, np.int8))
+    law(0, states, None, out)
+    return float(out.force.reshape(K, d)[:, -1].sum())
+
+
 def _start(
-    batch: Batch, model: mujoco.MjModel, plan: Plan, desired: tuple[Array, Array, Array], errors: Array
-) -> ContactRows | None:
-    """Put every world on its contact, off the reference by `errors` (W,) [rad]; its contact rows.
+    batch: Batch,
+    model: mujoco.MjModel,
+    plan: Plan,
+    desired: tuple[Array, Array, Array],
+    errors: Array,
+    depth: float,
+) -> None:
+    """Put every world on its contact, off the reference by `errors` (W,) [rad].
 
     Everything else is where the model's first keyframe, or else qpos0, has it.
+
+    Args:
+        depth: at which it rests under its load; one that has less to carry at first would slide [m].
 
     Raises:
         ModelError: the object would touch something else there; it is named.
@@ -185,11 +233,12 @@ def _start(
     body = plan.body
     data, up, point = initial_data(model), matrix(body.table)[:, 2], plan.contacts[0]
     lever = float(np.linalg.norm(body.com - point) + plan.radius[0])
+    depth = float(np.clip(depth, START_DEPTH * lever, DEEPEST * lever))
     kind, floats = int(mujoco.mjtState.mjSTATE_INTEGRATION), 0.0
     state = np.empty(mujoco.mj_stateSize(model, kind))
     for row, error in zip(batch.state, errors, strict=True):
         for _ in range(2):  # a contact with a margin holds the body above the table: how far, only MuJoCo knows
-            at = plan.at + (plan.radius[0] + floats - START_DEPTH * lever) * up
+            at = plan.at + (plan.radius[0] + floats - depth) * up
             place(model, data, body, quaternion_product(exponential(error * plan.axis), desired[0][0]), point, at)
             touching = point - plan.radius[0] * up @ data.xmat[body.index].reshape(3, 3)
             turn(model, data, body, desired[1][0], touching)
@@ -199,7 +248,6 @@ def _start(
         refuse_strays(model, data, body)
         mujoco.mj_getState(model, data, state, kind)
         row[:] = state
-    return read_rows(model, data, body.index, body.support)
 
 
 def believe(
@@ -249,9 +297,6 @@ def _check(controller: WrenchController, case: Scenario, plan: Plan) -> None:
     ignored = [key for key in CONTROL_KEYS if key in case.changes]
     if ignored:
         raise fail(ignored[0], case.changes[ignored[0]], "left out: the controller that is given has its own")
-
-
-Samples = tuple[Array, Array, Array]
 
 
 def _desired(case: Scenario, plan: Plan, time: Array) -> tuple[Samples, Samples, Turn]:

@@ -58,8 +58,9 @@ def print_run(console: Console, run: Run) -> None:
             "[green]pass[/]" if check.passed else "[red]FAIL[/]",
         )
         if check.name == "slip_max_m":
-            floor = 1e3 * summary["slip_floor_m"]
-            table.add_row("  of which the simulator's own, predicted", f"{_short(floor)} mm", "", "", style="dim")
+            floor, unknown = 1e3 * summary["slip_floor_m"], summary["slip_floor_unknown"]
+            told = f"unknown: {unknown}" if unknown else f"{_short(floor)} mm"
+            table.add_row("  of which the simulator's own, predicted", told, "", "", style="dim")
     console.print(table)
     failed = run.failed_worlds.size
     console.print(
@@ -98,6 +99,8 @@ def print_run(console: Console, run: Run) -> None:
         console.print(told, style="yellow", soft_wrap=True)
     for warning in run.engine_warnings:
         console.print(f"MuJoCo: {warning}", style="yellow", highlight=False, soft_wrap=True)
+    for reason in summary["reasons"]:
+        console.print(f"why: {reason}", style="yellow", soft_wrap=True, highlight=False)
     for event in run.events[:_EVENTS]:
         console.print(f"world {event.world}, {event.time:.3f} s: {event.what}", style="yellow", soft_wrap=True)
     if len(run.events) > _EVENTS:

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -35,13 +36,14 @@ def stem(case: Scenario) -> str:
     return "-".join(re.sub(r"[^\w.,+#-]+", "_", part) for part in dict.fromkeys(parts) if part)
 
 
-def save(run: Run, folder: Path, world: int | None = None) -> Saved:
+def save(run: Run, folder: Path, world: int | None = None, *, also: Mapping[str, Any] | None = None) -> Saved:
     """Write NAME.rrd and NAME.summary.json, which is also the folder's summary.json, each whole or not at all.
 
     Args:
         run: of `simulate`.
         folder: that exists.
         world: that is recorded; None: the worst.
+        also: further entries of the summary.
 
     Raises:
         ValueError: there is no such world.
@@ -62,6 +64,7 @@ def save(run: Run, folder: Path, world: int | None = None) -> Saved:
         recording, told = None, f"nothing is recorded: {off}"
     summary = {
         **jsonable(run.summary()),
+        **jsonable(dict(also or {})),
         "recording": None if recording is None else recording.name,
         "recorded_world": None if recording is None else chosen,
     }

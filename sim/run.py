@@ -11,20 +11,23 @@ from pivoting.controller.plan import Plan
 from pivoting.controller.so3 import rotated
 from pivoting.controller.space import CONJUGATE, Space, quaternion_product, space
 from pivoting.controller.units import lever
+from pivoting.models.contact_settings import ContactSettings
 from pivoting.models.frames import matrix
 from pivoting.models.naming import label
 from pivoting.models.reading import RigidBody
+from pivoting.sim.advice import reasons, remedies
 from pivoting.sim.attach import Attached
 from pivoting.sim.contact_readings import ContactReadings, Declared
 from pivoting.sim.control import BOUNDED, Event, PlanLog, plan_figures
-from pivoting.sim.fidelity import ContactRows
-from pivoting.sim.monitor import Measures, measure
+from pivoting.sim.fidelity import ContactRows, Held, stepped_point
+from pivoting.sim.monitor import Measures, measure, slip_floor_unknown
 from pivoting.sim.relative import Load
 from pivoting.sim.scenario import Scenario
 from pivoting.sim.strays import stray_words
 from pivoting.sim.verdict import Check, Limits, judge, worst_world
 
 Array = NDArray[np.float64]
+_CHOSEN = ("contacts", "coupling", "reason")  # of the contact settings, what the model itself does not say
 
 
 def frozen(values: Array) -> Array:
@@ -52,12 +55,13 @@ class Run:
         load: what the scenario's relative values are relative to.
         model: the world's, with the sensors of the loop.  truth: the body as that has it.
         replaced: what of the file gave way to the settings of the shipped scenes: name, and what it was.
+        settings: contact parameters that were chosen for the object, if they were.
         declared: the contacts that are to stick, as the world has them.
         radius: (K,) of what rolls, else 0 [m].
         face: (P, 3) likewise, the corners of the face that the object lies on at angle 0.
         turn: the axis (3,) [world axes] and the orientation (4,) at angle 0 that `theta` is counted from.
         mu_world: the world's friction.
-        contact_rows: MuJoCo's contact at the start, for the predicted slip.
+        contact_rows: MuJoCo's contacts with the support, for the predicted slip.
         start: qpos (W, nq) and qvel (W, nv) of the worlds at time 0, from which the applied wrenches replay the run.
         time: (N+1,) [s].
         reference: desired angle, rate and acceleration, each (N+1,) [rad, s].
@@ -70,7 +74,7 @@ class Run:
         wrench_world: (W, N, 6) applied force and torque at the CoM, world axes.
         force: (W, N, K, d) contact forces (f_t, f_n) or (f_t, f_o, f_n) predicted by the solution, table axes [N].
         force_measured: (W, N, K, d) by MuJoCo's contacts, likewise.
-        contacts: what else they say, see `ContactReadings`.
+        contacts: what else they say, see `ContactReadings`; held: what their rows do, see `Held`.
         residual: (W, N) relative KKT residuals.
         status: (W, N) codes of `solution.STATUS`; 0 is solved, 3 as far as the bounds allowed.
         control_us: (N,) time to state, solve and certify the problem of one world [microseconds].
@@ -88,6 +92,7 @@ class Run:
     model: mujoco.MjModel
     truth: RigidBody
     replaced: tuple[tuple[str, str], ...]
+    settings: ContactSettings | None
     declared: Declared
     radius: Array
     face: Array
@@ -108,6 +113,7 @@ class Run:
     force: Array
     force_measured: Array
     contacts: ContactReadings
+    held: Held
     residual: Array
     status: NDArray[np.int8]
     control_us: Array
@@ -188,6 +194,18 @@ class Run:
     def lever(self) -> Array:
         """(W, N+1, K, 3) from the CoM to where the contacts touch, table axes [m]."""
         return frozen(self.turning - self._up)
+
+    @cached_property
+    def stepped(self) -> Array:
+        """(W, N+1, 3) from the CoM to the point of the body whose velocity MuJoCo steps, table axes [m]."""
+        point = stepped_point(self.model, self.truth.index) - self.truth.com
+        return frozen(self._from_com(point[None] @ matrix(self.truth.axes))[..., 0, :])
+
+    @cached_property
+    def stepped_velocity(self) -> Array:
+        """(W, N+1, 3) of that point, table axes [m/s]."""
+        omega = self.angular_velocity @ self.table_axes
+        return frozen(self.velocity @ self.table_axes + np.cross(omega, self.stepped))
 
     @cached_property
     def corner(self) -> Array:
@@ -295,12 +313,15 @@ class Run:
             "failed_worlds": self.failed_worlds.tolist(),
             "worst_world": self.worst_world,
             **worst,
+            "slip_floor_unknown": slip_floor_unknown(self) or None,
             "solve_us_median": float(np.median(self.control_us)),
             "solve_us_p99": float(np.quantile(self.control_us, 0.99)),
             "sim_s": float(self.time[-1]),
             "wall_s": self.wall_s,
             "real_time_factor": self.worlds * float(self.time[-1]) / self.wall_s,
             "bounded_steps": int(np.count_nonzero(self.status == BOUNDED)),
+            "reasons": reasons(self),
+            "remedies": [remedy.setting for remedy in remedies(self)],
             "undeclared_contacts": self.strays,
             "support": label(self.model, self.truth.support).strip("'"),
             "object": self.object,
@@ -338,6 +359,7 @@ class Run:
             "impratio": float(opt.impratio),
             "cone": mujoco.mjtCone(int(opt.cone)).name.removeprefix("mjCONE_").lower(),
             "replaced": dict(self.replaced),
+            **({} if self.settings is None else {key: getattr(self.settings, key) for key in _CHOSEN}),
         }
 
     @cached_property

@@ -23,10 +23,7 @@ class JsonOutput:
     def __init__(self) -> None:
         sys.stdout.flush()
         self._kept = os.dup(1)
-        try:
-            os.dup2(2, 1)
-        except OSError:  # there is no stderr
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        os.dup2(2, 1)
 
     def __call__(self, value: Any) -> None:
         """Write the object, once, in strict JSON: a nan in it raises ValueError."""

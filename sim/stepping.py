@@ -9,8 +9,9 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 from pivoting.controller.controller import WrenchController, world_wrench
-from pivoting.sim.contact_readings import ContactReadings, Declared, read_contacts
+from pivoting.sim.contact_readings import FIELDS, ContactReadings, Declared, list_contacts, read_contacts
 from pivoting.sim.control import Answers, Control, States
+from pivoting.sim.fidelity import ContactRows, Held, held
 
 Array = NDArray[np.float64]
 POSE = ("position", "quaternion", "velocity", "angular_velocity")
@@ -24,7 +25,7 @@ class Log(NamedTuple):
         states: position (W, N+1, 3), quaternion (W, N+1, 4), velocity and angular velocity (W, N+1, 3), world axes.
         answers: required and wrench (W, N, nw), force (W, N, K d), residual and status (W, N).
         wrench_world: (W, N, 6).
-        contacts: `ContactReadings` with (W, N) first.
+        contacts: `ContactReadings`, and held: `Held`, with (W, N) first.
         control_ns: (N,) for all worlds together.
         wall_s: of the loop.
     """
@@ -33,6 +34,7 @@ class Log(NamedTuple):
     answers: Answers
     wrench_world: Array
     contacts: ContactReadings
+    held: Held
     control_ns: Array
     wall_s: float
 
@@ -40,20 +42,38 @@ class Log(NamedTuple):
 class ContactLog:
     """Sorts the contacts of every step, block by block: what MuJoCo lists of them would fill the memory."""
 
-    def __init__(self, declared: Declared, where: dict[str, slice], steps: int, worlds: int):
-        self._declared, self._where = declared, where
+    def __init__(
+        self,
+        declared: Declared,
+        rows: ContactRows | None,
+        axes: Array,
+        where: dict[str, slice],
+        steps: int,
+        worlds: int,
+    ):
+        self._declared, self._rows, self._axes, self._where = declared, rows, axes, where
         K = len(declared.points)
         self.readings = ContactReadings(
             *(np.empty((steps, worlds, *rest)) for rest in ((K, 3), (K,), (), (), (), ())),
+        )
+        self.held = Held(
+            np.full((steps, worlds, K, 2), np.nan), np.zeros((steps, worlds, K)), np.zeros((steps, worlds), np.bool_)
         )
 
     def sort(self, first: int, states: Array, contacts: Array) -> None:
         """Sort the contacts (B, W, sensors) of the steps from `first` on, that began at the states (B, W, sensors)."""
         at = self._declared.touch(*(states[..., self._where[key]] for key in POSE[:2]))
-        listed, touching = (contacts[..., self._where[key]] for key in ("contacts", "touching"))
-        found = read_contacts(listed, touching, at, self._declared)
-        for kept, values in zip(self.readings, found, strict=True):
-            kept[first : first + len(values)] = values
+        sensed, touching = (contacts[..., self._where[key]] for key in ("contacts", "touching"))
+        listed = list_contacts(sensed, at, self._declared)
+        found = sensed[..., ::FIELDS].max(axis=-1)
+        self._keep(first, self.readings, read_contacts(listed, found, touching, self._declared))
+        if self._rows is not None:
+            self._keep(first, self.held, held(self._rows, listed, at, self._axes))
+
+    @staticmethod
+    def _keep(first: int, kept: tuple[Any, ...], read: tuple[Any, ...]) -> None:
+        for values, new in zip(kept, read, strict=True):
+            values[first : first + len(new)] = new
 
 
 def run_steps(
@@ -113,6 +133,7 @@ def run_steps(
         answers=Answers(*(_worlds_first(values) for values in out)),
         wrench_world=_worlds_first(wrench_world),
         contacts=ContactReadings(*(_worlds_first(values) for values in contacts.readings)),
+        held=Held(*(_worlds_first(values) for values in contacts.held)),
         control_ns=spent,
         wall_s=perf_counter() - start,
     )

@@ -72,6 +72,38 @@ def test_while_results_are_written(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+LIBRARY = """
+import ctypes, signal, sys, time
+from pivoting.__main__ import main
+
+def lost():  # in a callback out of C, where nothing can be raised
+    ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))()
+    time.sleep(100)
+
+def renamed():  # as C extensions do whose imports fail
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt:
+        raise ImportError("numpy.core.multiarray failed to import") from None
+
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == "mujoco":
+            {what}()
+
+sys.meta_path.insert(0, Finder())
+main()
+"""
+
+
+@pytest.mark.parametrize("what", ["lost", "renamed"])
+def test_whatever_a_library_makes_of_it(what: str) -> None:
+    call = [sys.executable, "-c", LIBRARY.replace("{what}", what), "list"]
+    done = subprocess.run(call, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout) == (130, "")
+    assert [line for line in done.stderr.splitlines() if not line.startswith("pivoting: compiling")] == [LINE]
+
+
 def test_a_job_in_the_background_is_left_alone() -> None:
     """Where a shell has SIGINT ignored, it stays ignored."""
     call = [sys.executable, "-m", "pivoting", "list"]

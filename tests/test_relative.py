@@ -47,12 +47,11 @@ def test_relative_bounds_are_those_in_newtons() -> None:
     """Of the object as it is believed: what the world has is not known."""
     given = {"seconds": 0.7, "mass": 2.0, "gravity": 5.0, "world": {"mass": 2.1}}
     relative = simulate("balance-2d", **given, force_max="0.33w", moment_max="0.13w", f_min="0.2w")
-    newtons = simulate("balance-2d", **given, force_max=3.3, moment_max=1.3 * LEVER, f_min=2.0)
-    assert relative.summary()["resolved"] == pytest.approx(
-        {"force_max": 3.3, "moment_max": 1.3 * LEVER, "f_min": 2.0}, rel=1e-9
-    )
+    resolved = relative.summary()["resolved"]
+    assert resolved == pytest.approx({"force_max": 3.3, "moment_max": 1.3 * LEVER, "f_min": 2.0}, rel=1e-9)
+    newtons = simulate("balance-2d", **given, **resolved)
     assert newtons.summary()["resolved"] == {}
-    assert np.abs(relative.wrench - newtons.wrench).max() < 1e-6
+    assert np.array_equal(relative.wrench, newtons.wrench)
     assert np.linalg.norm(relative.wrench[..., :2], axis=-1).max() <= 3.3 * (1.0 + 1e-6)
     assert relative.scenario.force_max == "0.33w"  # as it was asked for
     assert relative.scenario.label.endswith("force_max=0.33w moment_max=0.13w world.mass=2.1")

@@ -93,6 +93,15 @@ def test_a_reader_that_goes_ends_it_quietly_as_other_tools(words: list[str]) -> 
         assert word not in told
 
 
+@pytest.mark.parametrize("closed", ["1>&-", "2>&-", "1>&- 2>&-"])
+def test_where_a_stream_is_closed(closed: str) -> None:
+    call = f"'{sys.executable}' -m pivoting example --json {closed}"
+    done = subprocess.run(["bash", "-c", call], capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0
+    assert "Traceback" not in done.stderr
+    assert done.stdout == "" or json.loads(done.stdout)["agrees"]
+
+
 def test_only_the_backend_that_is_named_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each that is tried may print, or look for a licence."""
     import qpsolvers

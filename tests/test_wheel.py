@@ -1,40 +1,62 @@
-"""A built wheel, installed elsewhere, runs: what is missing from the package is found here and not by its users."""
+"""A built wheel, installed elsewhere, runs: what is missing from the package is found here and not by its users.
 
+Also where nothing can be written, as in a container: neither in the installation nor in a home.
+"""
+
+import ctypes
 import json
 import os
 import subprocess
 import sys
 import zipfile
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parent.parent
+MEMORY = (
+    "pivoting: compiling in memory, in every run: no folder for a cache can be written to, NUMBA_CACHE_DIR names one"
+)
 
 
-def test_a_built_wheel_installed_elsewhere_runs_the_pivot(tmp_path: Path) -> None:
-    wheels, target = tmp_path / "wheels", tmp_path / "site"
-    subprocess.run(
-        [sys.executable, "-m", "build", "--wheel", "--outdir", str(wheels), str(ROOT)], check=True, capture_output=True
-    )
-    (wheel,) = wheels.glob("*.whl")
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Built by the locked backend: nothing is asked of a registry."""
+    out = tmp_path_factory.mktemp("wheel")
+    build = ["-m", "build", "--wheel", "--no-isolation", "--outdir", str(out), str(ROOT)]
+    subprocess.run([sys.executable, *build], check=True, capture_output=True)
+    (built,) = out.glob("*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def site(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that it is installed in."""
+    target = tmp_path_factory.mktemp("site")
+    call = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", "--target", str(target)]
+    subprocess.run([*call, str(wheel)], check=True, capture_output=True)
+    return target
+
+
+def test_everything_is_in_it(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
-    for room in ("controller", "models", "sim"):
-        for path in (ROOT / room).iterdir():
+    for room, folder in (("controller/", "controller"), ("models/", "models"), ("sim/", "sim"), ("", "pivoting")):
+        for path in (ROOT / folder).iterdir():
             if path.suffix in (".py", ".xml", ".typed"):
-                assert f"pivoting/{room}/{path.name}" in names
-    subprocess.run(
-        [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", str(target), str(wheel)],
-        check=True,
-        capture_output=True,
-    )
-    elsewhere = tmp_path / "elsewhere"
-    elsewhere.mkdir()
-    environment = {**os.environ, "PYTHONPATH": str(target)}
-    where = [sys.executable, "-c", "import pivoting.sim; print(pivoting.sim.__file__)"]
-    found = subprocess.run(where, cwd=elsewhere, env=environment, capture_output=True, text=True, check=True)
-    assert found.stdout.startswith(str(target))
+                assert f"pivoting/{room}{path.name}" in names
+    assert not [name for name in names if not name.startswith("pivoting")]
+
+
+def test_installed_elsewhere_it_runs_the_pivot(site: Path, tmp_path: Path) -> None:
+    environment = {**os.environ, "PYTHONPATH": str(site)}
+    where = [sys.executable, "-c", "import pivoting, pivoting.sim; print(pivoting.__path__, pivoting.sim.__file__)"]
+    found = subprocess.run(where, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+    assert found.stdout == f"['{site}/pivoting'] {site}/pivoting/sim/__init__.py\n"
     done = subprocess.run(
-        [sys.executable, str(target / "bin" / "pivoting"), "run", "pivot-2d", "--json"],
-        cwd=elsewhere,
+        [sys.executable, str(site / "bin" / "pivoting"), "run", "pivot-2d", "--json"],
+        cwd=tmp_path,
         env=environment,
         capture_output=True,
         text=True,
@@ -42,3 +64,81 @@ def test_a_built_wheel_installed_elsewhere_runs_the_pivot(tmp_path: Path) -> Non
     )
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["verdict"] == "pass"
+
+
+def bound_by_permissions() -> None:
+    """In a child: root gives up what lets it write where the permissions do not."""
+    with suppress(AttributeError, OSError):
+        for capability in (1, 2):  # CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH
+            ctypes.CDLL(None).prctl(24, capability, 0, 0, 0)  # PR_CAPBSET_DROP
+
+
+@pytest.fixture
+def read_only(site: Path, tmp_path: Path) -> Iterator[dict[str, str]]:
+    """An environment in which neither the installation nor the home can be written to."""
+    home = tmp_path / "home"
+    home.mkdir()
+    folders = [home, site, *(path for path in site.rglob("*") if path.is_dir())]
+    for folder in folders:
+        folder.chmod(0o555)
+    try:
+        probe = [sys.executable, "-c", f"open({str(site / 'x')!r}, 'w')"]
+        if subprocess.run(probe, preexec_fn=bound_by_permissions, capture_output=True, check=False).returncode == 0:
+            pytest.skip("permissions do not bind here")
+        kept = {key: value for key, value in os.environ.items() if key not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
+        yield {**kept, "PYTHONPATH": str(site), "HOME": str(home), "MPLCONFIGDIR": str(tmp_path)}
+    finally:
+        for folder in folders:
+            folder.chmod(0o755)
+
+
+def run(environment: dict[str, str], *words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "pivoting", *words],
+        cwd=cwd,
+        env=environment,
+        preexec_fn=bound_by_permissions,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
+def test_where_nothing_can_be_written_it_compiles_in_memory_and_says_so(
+    read_only: dict[str, str], tmp_path: Path
+) -> None:
+    told = run(read_only, "--version", cwd=tmp_path)
+    assert told.returncode == 0, told.stderr
+    assert told.stdout.startswith("pivoting 0.")
+    assert told.stderr.splitlines() == [MEMORY]
+    done = run(read_only, "run", "balance-2d", "--set", "seconds=1", "--out", "out", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["verdict"] == "pass"
+    memory, wrote = done.stderr.splitlines()
+    assert memory == MEMORY
+    assert wrote.startswith("wrote out")
+
+
+def test_the_variable_that_is_named_sets_a_place(read_only: dict[str, str], tmp_path: Path) -> None:
+    place = tmp_path / "place"
+    first = run({**read_only, "NUMBA_CACHE_DIR": str(place)}, "list", cwd=tmp_path)
+    again = run({**read_only, "NUMBA_CACHE_DIR": str(place)}, "list", cwd=tmp_path)
+    assert "pivot-2d" in first.stdout
+    assert first.stderr.startswith("pivoting: compiling for this machine, once")
+    assert f"{place}/" in first.stderr
+    assert again.stderr == ""
+
+
+def test_a_home_alone_will_do(read_only: dict[str, str], tmp_path: Path) -> None:
+    """And kernels that are kept there are dropped when the sources change, as everywhere."""
+    home = tmp_path / "other"
+    home.mkdir()
+    for expected in ("pivoting: compiling for this machine, once", ""):
+        done = run({**read_only, "HOME": str(home)}, "list", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert done.stderr.startswith(expected)
+        assert str(home) in done.stderr or not expected
+    (kept,) = home.rglob("kernels.sha256")
+    kept.write_text("other sources")
+    assert run({**read_only, "HOME": str(home)}, "list", cwd=tmp_path).stderr.startswith("pivoting: compiling for")
