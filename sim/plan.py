@@ -10,7 +10,7 @@ from pivoting.controller.space import quaternion_product
 from pivoting.models.candidates import planar_stance, stance
 from pivoting.models.frames import matrix, quaternion
 from pivoting.models.given import NEAR
-from pivoting.models.grip import holds
+from pivoting.models.grip import grip
 from pivoting.models.naming import ModelError, label
 from pivoting.models.reading import RigidBody, file_frame, initial_data, read_body
 from pivoting.models.tilt import Arc
@@ -97,14 +97,15 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
     now = data.xmat[body.index].reshape(3, 3)
     origin, axes = file_frame(model, body.index)
     contact = case.contact if isinstance(case.contact, str) else _in_body_frame(case.contact, (origin, axes))
+    arc = None if case.about == "yaw" else _arc(case)
     found = stance(
         model,
         body.index,
         contact,
         quaternion(now),
         body.table,
-        arc=None if case.about == "yaw" else _arc(case),
-        holds=holds(model, body),
+        arc=arc,
+        gripped=None if case.about == "yaw" else grip(model, body, arc),
         shown=lambda points: (points - origin) @ axes,
     )
     start, axis = table @ found.rotation, table @ found.axis
