@@ -63,7 +63,7 @@ def fleets(worlds: int) -> dict[str, float]:
             *(("plans_failed", "plan_residual_max", "bounded_steps") if "plans" in summary else ()),
         ):
             out[f"{name}: {key}"] = float(summary[key])
-        bounds = run.scenario.bounds()
+        bounds = run.scenario.absolute(run.load).bounds()
         if bounds.any:
             out[f"{name}: wrench above its bounds, of these"] = bounds.excess(run.wrench)
         out[f"{name}: worlds"] = float(count)

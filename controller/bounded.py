@@ -121,6 +121,9 @@ class BoundedSolver:
         force, wrench = answer.x[:n] * self._unit, answer.x[n : n + nw] * self._scale
         lacking = required - jacobian @ force - wrench
         exact = bool(np.abs(lacking / self._scale).max() <= EXACT)
+        if exact:  # to the last bit: what a solver leaves of an equality is no lack, and costs the bound as little
+            wrench = required - jacobian @ force
+            lacking = np.zeros(nw)
         return BoundedWrench(
             wrench, force.reshape(len(self._belief.mu), -1), lacking, answer.residual, exact
         )  # fmt: skip

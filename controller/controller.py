@@ -152,10 +152,16 @@ class WrenchController:
         _fill_problem(self.belief, q, still, q, still, still, R, J, np.empty(len(self.Q_w)))
         return J
 
-    def problem(self, state: Motion, desired: Motion | None = None) -> WrenchProblem:
+    def problem(
+        self, state: Motion, desired: Motion | None = None, *, external: ArrayLike | None = None
+    ) -> WrenchProblem:
         """The wrench problem, in object axes, at `state` (acceleration not used), reference at `desired`.
 
-        With `desired` left out the object is to stay where it is.
+        Args:
+            state: measured.
+            desired: left out, the object is to stay where it is.
+            external: (nw,) known wrench on the object besides gravity, contacts and the controller's own, such as that
+                of damped joints, about the CoM, object axes [N, N m].
         """
         belief = self.belief
         q, omega, _ = self.space.lift_motion(state)
@@ -163,6 +169,8 @@ class WrenchController:
         q_d, omega_d, alpha_d = self.space.lift_motion(target)
         R, J, required = np.empty((3, 3)), np.empty((len(self.Q_w), len(self.Q_f))), np.empty(len(self.Q_w))
         _fill_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, required)
+        if external is not None:
+            required -= array("external", external, required.shape)
         return WrenchProblem(
             J,
             required,
@@ -196,8 +204,11 @@ def _fill_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ig
 
 
 @kernel
-def step_worlds(belief, bounds, work, tolerance, q, omega, q_d, omega_d, alpha_d, wrench, force, residual, status):  # type: ignore[no-untyped-def]
-    """State, solve and certify the problem of every world; answers are written into the last four arrays.
+def step_worlds(  # type: ignore[no-untyped-def]
+    belief, bounds, work, tolerance, q, omega, q_d, omega_d, alpha_d, external, required, wrench, force, residual,
+    status,
+):  # fmt: skip
+    """State, solve and certify the problem of every world; answers are written into the last five arrays.
 
     Args:
         belief: `Belief`, shared by the worlds.
@@ -207,17 +218,22 @@ def step_worlds(belief, bounds, work, tolerance, q, omega, q_d, omega_d, alpha_d
         tolerance: largest relative KKT residual of status 0 (solved).
         q: (W, 4) and omega: (W, 3), the measured orientations and angular velocities, world axes.
         q_d, omega_d, alpha_d: (W, 4), (W, 3), (W, 3), the reference now; (1, ...) is the same for all worlds.
+        external: (W, nw) or (1, nw), known wrenches on the object besides gravity, contacts and the controller's own,
+            object axes.
+        required: (W, nw) out, the right-hand side J f + w of the problem, `external` taken off, object axes.
         wrench: (W, nw) out, in object axes; nan where the status is 2 (failed: no finite answer).
         force: (W, K d) out, in contact axes.
         residual: (W,) out.  status: (W,) out, int8: 0 solved, 1 inaccurate, 2 failed.
     """
     nw, n = belief.wrench_map.shape[0], belief.points.shape[0] * belief.force_map.shape[1]
-    R, J, b = np.empty((3, 3)), np.empty((nw, n)), np.empty(nw)
+    R, J = np.empty((3, 3)), np.empty((nw, n))
     Q, root = np.empty((nw, nw)), np.empty(6)
     Q_w, Q_f, mu, f_min = belief.Q_w, belief.Q_f, belief.mu, belief.f_min  # taken out once: it shows in the plane
     for i in range(q.shape[0]):
-        j = i % q_d.shape[0]
+        j, b = i % q_d.shape[0], required[i]
         _fill_problem(belief, q[i], omega[i], q_d[j], omega_d[j], alpha_d[j], R, J, b)
+        for row in range(nw):
+            b[row] -= external[i % external.shape[0], row]
         Q[:], ball = Q_w, -1
         for attempt in range(ATTEMPTS + 1):
             residual[i] = smallest_wrench(J, b, Q, Q_f, mu, f_min, force[i], wrench[i], work[0], work[1])

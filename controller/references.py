@@ -1,18 +1,28 @@
 """References: where the object should be at each time, as angle, rate and acceleration."""
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pivoting.controller.space import Motion
-from pivoting.controller.validate import Array, array, fail, number
+from pivoting.controller.validate import array, fail, number
 
 
 class Reference(Protocol):
-    """Anything that gives the desired motion at times (N,) [s]: angle, rate and acceleration, each (N,) [rad, s]."""
+    """Anything that gives the desired motion at times (N,) [s]: angle, rate and acceleration, each (N,) [rad, s].
 
-    def __call__(self, times: Array) -> Motion:
+    In space (`controller.rotations`) orientation (N, 4), angular velocity and acceleration (N, 3). A single time gives
+    single values. After its `duration` it rests.
+    """
+
+    @property
+    def duration(self) -> float:
+        """When it has come to its end [s]; inf if it goes on for ever."""
+        ...
+
+    def __call__(self, times: ArrayLike) -> Motion:
         """The desired motion at each of `times`."""
         ...
 
@@ -24,9 +34,14 @@ class Constant:
     theta: float
 
     def __post_init__(self) -> None:
-        number("theta", self.theta, unit="rad")
+        object.__setattr__(self, "theta", number("theta", self.theta, unit="rad"))
 
-    def __call__(self, times: Array) -> Motion:
+    @property
+    def duration(self) -> float:
+        """It goes on for ever."""
+        return math.inf
+
+    def __call__(self, times: ArrayLike) -> Motion:
         zero = np.zeros(np.shape(times))
         return Motion(zero + self.theta, zero, zero.copy())
 
@@ -45,10 +60,10 @@ class MinimumJerk:
     def __post_init__(self) -> None:
         if len(self.waypoints) < 2:
             raise fail("waypoints", self.waypoints, "at least two angles")
-        for angle in self.waypoints:
-            number("waypoints", angle, unit="rad")
-        number("seconds", self.seconds, above=0.0, unit="s")
-        number("hold", self.hold, at_least=0.0, unit="s")
+        put = object.__setattr__  # whole numbers are as good as any, and what is made of them is of their type
+        put(self, "waypoints", tuple(number("waypoints", angle, unit="rad") for angle in self.waypoints))
+        put(self, "seconds", number("seconds", self.seconds, above=0.0, unit="s"))
+        put(self, "hold", number("hold", self.hold, at_least=0.0, unit="s"))
 
     @property
     def duration(self) -> float:
@@ -56,7 +71,7 @@ class MinimumJerk:
         arcs = len(self.waypoints) - 1
         return self.hold + arcs * (self.seconds + self.hold)
 
-    def __call__(self, times: Array) -> Motion:
+    def __call__(self, times: ArrayLike) -> Motion:
         times = np.asarray(times, dtype=float)
         angle = np.full(times.shape, self.waypoints[0])
         rate, acceleration = np.zeros(times.shape), np.zeros(times.shape)
@@ -78,11 +93,17 @@ class Sine:
     period: float
 
     def __post_init__(self) -> None:
-        number("mean", self.mean, unit="rad")
-        number("amplitude", self.amplitude, unit="rad")
-        number("period", self.period, above=0.0, unit="s")
+        put = object.__setattr__
+        put(self, "mean", number("mean", self.mean, unit="rad"))
+        put(self, "amplitude", number("amplitude", self.amplitude, unit="rad"))
+        put(self, "period", number("period", self.period, above=0.0, unit="s"))
 
-    def __call__(self, times: Array) -> Motion:
+    @property
+    def duration(self) -> float:
+        """It goes on for ever."""
+        return math.inf
+
+    def __call__(self, times: ArrayLike) -> Motion:
         w = 2.0 * np.pi / self.period
         s, c = np.sin(w * np.asarray(times)), np.cos(w * np.asarray(times))
         return Motion(self.mean + self.amplitude * s, self.amplitude * w * c, -self.amplitude * w * w * s)
@@ -102,11 +123,15 @@ class Sampled:
             raise fail("samples", self.samples, "at least six angles [rad], as a quintic spline needs")
         self.dt = number("dt", dt, above=0.0, unit="s")
         knots = self.dt * np.arange(self.samples.size)
-        self._end = float(knots[-1])
         self._curve = make_interp_spline(knots, self.samples, k=5)
 
-    def __call__(self, times: Array) -> Motion:
+    @property
+    def duration(self) -> float:
+        """Time of the last sample [s]."""
+        return self.dt * (self.samples.size - 1)
+
+    def __call__(self, times: ArrayLike) -> Motion:
         times = np.asarray(times, dtype=float)
-        inside = np.clip(times, 0.0, self._end)
-        moving = (times >= 0.0) & (times <= self._end)
+        inside = np.clip(times, 0.0, self.duration)
+        moving = (times >= 0.0) & (times <= self.duration)
         return Motion(self._curve(inside), *(np.where(moving, self._curve(inside, k), 0.0) for k in (1, 2)))

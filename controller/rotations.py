@@ -1,9 +1,10 @@
 """References in space: where the object's orientation should be, as quaternion, angular velocity and acceleration.
 
-Each gives at times (N,) [s] a `Motion` of quaternions (N, 4) object to world, and angular velocities and accelerations
-(N, 3) in world axes [rad/s, rad/s^2].
+Each is a `references.Reference` and gives at times (N,) [s] a `Motion` of quaternions (N, 4) object to world, and
+angular velocities and accelerations (N, 3) in world axes [rad/s, rad/s^2].
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -40,7 +41,12 @@ class Turn:
         object.__setattr__(self, "axis", direction / length)
         object.__setattr__(self, "start", unit_quaternion("start", start))
 
-    def __call__(self, times: Array) -> Motion:
+    @property
+    def duration(self) -> float:
+        """That of the angle [s]; a plain function of time has none, and goes on for ever."""
+        return float(getattr(self.angle, "duration", math.inf))
+
+    def __call__(self, times: ArrayLike) -> Motion:
         angle, rate, acceleration = (np.asarray(values, dtype=float)[..., None] for values in self.angle(times))
         turned = quaternion_product(exponential(angle * self.axis), self.start)
         return Motion(turned, rate * self.axis, acceleration * self.axis)
@@ -83,7 +89,7 @@ class Waypoints:
             turns.append(Turn(MinimumJerk((0.0, angle), self.seconds), axis, start))
         return turns
 
-    def __call__(self, times: Array) -> Motion:
+    def __call__(self, times: ArrayLike) -> Motion:
         times = np.asarray(times, dtype=float)
         since = times - self.hold
         leg = np.clip(since // (self.seconds + self.hold), 0, len(self._turns) - 1).astype(int)
@@ -104,14 +110,18 @@ class SampledRotation:
             raise fail("orientations", points, "at least two quaternions")
         self.orientations = np.array([unit_quaternion("orientations", point) for point in points])
         self.dt = number("dt", dt, above=0.0, unit="s")
-        self._end = self.dt * (len(points) - 1)
         rotations = Rotation.from_quat(np.roll(self.orientations, -1, axis=-1))
         self._curve = RotationSpline(self.dt * np.arange(len(points)), rotations)
 
-    def __call__(self, times: Array) -> Motion:
+    @property
+    def duration(self) -> float:
+        """Time of the last sample [s]."""
+        return self.dt * (len(self.orientations) - 1)
+
+    def __call__(self, times: ArrayLike) -> Motion:
         times = np.asarray(times, dtype=float)
-        inside = np.clip(times, 0.0, self._end)
-        moving = ((times >= 0.0) & (times <= self._end))[..., None]
+        inside = np.clip(times, 0.0, self.duration)
+        moving = ((times >= 0.0) & (times <= self.duration))[..., None]
         at = self._curve(inside)
         # the spline's rates are in the object's axes, and the frame's own turning adds nothing: omega x omega = 0
         rate, acceleration = (at.apply(self._curve(inside, order)) for order in (1, 2))

@@ -3,24 +3,23 @@
 from typing import NamedTuple
 
 import numpy as np
-from pivoting.controller.problem import WrenchProblem
-from pivoting.controller.solution import Solution
 from pivoting.controller.validate import Array, fail
 
 
 class SolutionSpace(NamedTuple):
-    """A planar problem in wrench space (F_u, F_v, M), object axes [N, N, N m].
+    """A planar problem in wrench space (F_u, F_v, M), object axes [N, N, N m]; or many of them, (..., 3).
 
     J_c has two columns, so the contact's composite wrench cone {J f} is a flat sector of the 3-D wrench space, and the
     wrenches that balance, {required - J f}, are its mirror image with the apex moved to `required`, where the contact
     carries nothing. The optimum is the cheapest point of that set.
 
     Attributes:
-        cone: (P, 3) polygon of the contact's wrenches J f, apex (or floor) first.
-        admissible: (P, 3) polygon of the applied wrenches that balance: required - cone.
-        required: (3,) what contact and applied wrench make together (-m g for balance).
-        wrench: (3,) the optimum w.
-        contact: (3,) the contact's part of it, J f; wrench + contact = required.
+        cone: (..., P, 3) polygon of the contact's wrenches J f, apex (or floor) first.
+        admissible: (..., P, 3) polygon of the applied wrenches that balance: required - cone.
+        required: (..., 3) what contact and applied wrench make together (-m g for balance).
+        wrench: (..., 3) the applied wrench w.
+        contact: (..., 3) the contact's part, J f.
+        lacking: (..., 3) required - w - J f: nothing, unless bounds did not allow what is required.
     """
 
     cone: Array
@@ -28,30 +27,35 @@ class SolutionSpace(NamedTuple):
     required: Array
     wrench: Array
     contact: Array
+    lacking: Array
 
 
-def solution_space(solution: Solution, reach: float | None = None) -> SolutionSpace:
-    """The picture of a solved planar problem with one contact.
+def solution_space(
+    jacobian: Array, mu: float, f_min: float, required: Array, wrench: Array, force: Array, reach: float | None = None
+) -> SolutionSpace:
+    """The picture of planar problems with one contact and of their answers, as they are: nothing is solved here.
 
     Args:
-        solution: of the problem.
-        reach: largest normal force that is drawn [N]; default twice the load or the solution's, whichever is larger.
+        jacobian: (..., 3, 2).
+        mu: friction that may be used.  f_min: floor of the normal force [N].
+        required, wrench: (..., 3) [N, N m].  force: (..., 2) the contact's [N].
+        reach: largest normal force that is drawn [N]; default twice the load or the answers', whichever is larger.
 
     Raises:
         ValueError: the problem is not planar or has several contacts, whose cones do not fit one picture.
     """
-    problem: WrenchProblem = solution.problem
-    if problem.dim != 2 or problem.contacts != 1:
-        raise fail("solution", f"{problem.contacts} contacts in dimension {problem.dim}", "of one planar contact")
-    load = float(np.linalg.norm(problem.required[:2]))
-    top = 2.0 * max(load, float(solution.force[0, 1]), 1e-9) if reach is None else reach
-    mu, floor = float(problem.mu_planned[0]), float(problem.f_min[0])
-    forces = np.array([[-mu * floor, floor], [-mu * top, top], [mu * top, top], [mu * floor, floor]])
-    cone = forces @ problem.jacobian.T
+    if jacobian.shape[-2:] != (3, 2):
+        raise fail("jacobian", f"of shape {jacobian.shape}", "(..., 3, 2): of one planar contact")
+    load = float(np.linalg.norm(required[..., :2], axis=-1).max())
+    top = 2.0 * max(load, float(force[..., 1].max()), 1e-9) if reach is None else reach
+    forces = np.array([[-mu * f_min, f_min], [-mu * top, top], [mu * top, top], [mu * f_min, f_min]])
+    cone = forces @ np.swapaxes(jacobian, -1, -2)
+    contact = np.einsum("...ij,...j", jacobian, force)
     return SolutionSpace(
         cone=cone,
-        admissible=problem.required - cone,
-        required=np.array(problem.required),
-        wrench=np.array(solution.wrench),
-        contact=problem.jacobian @ solution.force[0],
+        admissible=required[..., None, :] - cone,
+        required=np.array(required),
+        wrench=np.array(wrench),
+        contact=contact,
+        lacking=required - wrench - contact,
     )

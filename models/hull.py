@@ -5,14 +5,15 @@ ellipsoid three. Along a direction w one reaches to w.c + |A'w|: what touches a 
 closed form.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.models.reading import Array, ModelError, matrix
+from pivoting.models.frames import Array, matrix
+from pivoting.models.naming import ModelError, label
 from scipy.spatial import ConvexHull, QhullError
 
 Indices = NDArray[np.int64]
@@ -43,12 +44,14 @@ class Hull:
     Attributes:
         centre: (N, 3).  axes: (N, 3, 3) the A above.  rank: (N,) of A: 0, 2 or 3.
         radius: (N,) of a ball, else 0.
-        geom: (N,) whose each is.
+        geom: (N,) whose each is.  label: of each geom, in words.
         ups: (F, 3) inward normals of the hull's facets.  facets: (F, 3) of which three ellipsoids each is.
+        beside: (F, 3) the facet across from each of these, beyond the edge of the other two.
         size: the hull's diagonal.  reach: what is closer to a plane is on it.
     """
 
     name: str
+    label: Mapping[int, str]
     com: Array
     centre: Array
     axes: Array
@@ -57,6 +60,7 @@ class Hull:
     geom: Indices
     ups: Array
     facets: Indices
+    beside: Indices
     size: float
     reach: float
 
@@ -86,7 +90,9 @@ class Hull:
         egg = found[(self.rank[found] == 3) & (self.radius[found] == 0.0)]
         rolling = [*self.geom[egg], *(geom for geom in tilted if tilted.count(geom) > 1)]
         if rolling:
-            rolls = f"its geom {rolling[0]} touches the table there, and it rolls: no material point stays put"
+            rolls = (
+                f"its geom {self.label[rolling[0]]} touches the table there, and it rolls: no material point stays put"
+            )
             raise ModelError(f"body = {self.name!r}: {rolls}; must be a corner, an edge, a rim or an end of a capsule")
         rings = [self.centre[i] + SAMPLES[2][::every] @ self.axes[i].T for i in found[flat]]
         points = np.concatenate([self.lowest(up, found[~flat]), *rings])
@@ -102,36 +108,9 @@ class Hull:
         """Whether on points of these it lies: on a face, or as a capsule does on a line, one end of which is a ball."""
         return len(owner) > 2 or (len(owner) == 2 and bool((self.radius[owner] > 0.0).any()))
 
-    def planes(self) -> Array:
-        """(P, 3) inward normals of planes to lie on: of the facets, and of lines that end on a ball.
-
-        The facets were of samples; those at a ball are made exact. On a line it may lie as a facet there does, or with
-        its CoM lowest.
-        """
-        balls = (self.radius > 0.0)[self.facets].any(axis=1)
-        found, lines = [*self.ups[~balls]], set()
-        for up, facet in zip(self.ups[balls], self.facets[balls], strict=True):
-            which = np.unique(facet)
-            if len(which) == 1:
-                continue
-            found.append(self._tangent(up, which))
-            if len(which) == 2:
-                lines.add(tuple(which.tolist()))
-        found += [self._tangent(self.centre[i] - self.com, np.array([i, j])) for i, j in lines]
-        unit = np.array([up for up in found if np.linalg.norm(up) > 0.5])
-        return unit[np.unique(np.round(unit, 6), axis=0, return_index=True)[1]]
-
-    def _tangent(self, up: Array, which: Indices) -> Array:
-        """Inward normal (3,) of the plane nearest to normal `up` that touches each of two or three; zero if none."""
-        for _ in range(8):  # converges quadratically, as Newton's method does
-            points = self.lowest(up, which)
-            across = points[1:] - points[0]
-            up = up - np.linalg.pinv(across, rcond=1e-9) @ (across @ up)
-            length = np.linalg.norm(up)
-            if length <= self.reach:
-                return np.zeros(3)
-            up = up / length
-        return up
+    def facets_of(self, which: Indices) -> Indices:
+        """The facets that any of these ellipsoids is of."""
+        return np.flatnonzero(np.isin(self.facets, which).any(axis=1))
 
 
 def read_hull(model: mujoco.MjModel, index: int, tolerance: float = TOLERANCE) -> Hull:
@@ -156,17 +135,21 @@ def read_hull(model: mujoco.MjModel, index: int, tolerance: float = TOLERANCE) -
         rolls = "it is all sphere or ellipsoid, and these roll: no tilt lifts it off one point"
         raise ModelError(f"body = {name!r}: {rolls}; must have a box, a mesh, a cylinder or a capsule")
     size = float(np.linalg.norm((centre + extent).max(axis=0) - (centre - extent).min(axis=0)))
-    clouds = [c + SAMPLES[k] @ A.T for c, A, k in zip(centre, axes, rank.tolist(), strict=True)]
+    owner = np.repeat(np.arange(len(rank)), [len(SAMPLES[k]) for k in rank.tolist()])
+    points = centre[owner]
+    for i in np.flatnonzero(rank > 0):
+        points[owner == i] += SAMPLES[int(rank[i])] @ axes[i].T
     try:  # C-: facets that are coplanar but for rounding (meshes are float32) become one, their inner corners none
-        hull = ConvexHull(np.concatenate(clouds), qhull_options=f"Qt C-{0.1 * TOLERANCE * size}")
+        hull = ConvexHull(points, qhull_options=f"Qt C-{0.1 * TOLERANCE * size}")
     except QhullError:
         raise ModelError(f"body = {name!r}: its colliding geoms are flat; must have a volume") from None
-    owner = np.repeat(np.arange(len(rank)), [len(cloud) for cloud in clouds])
     keep = (rank > 0) | np.isin(np.arange(len(rank)), owner[hull.vertices])
     fields = (centre[keep], axes[keep], rank[keep], radius[keep], geom[keep])
     facets = (np.cumsum(keep) - 1)[owner[hull.simplices]]
     com = np.array(model.body_ipos[index])
-    return Hull(name, com, *fields, -hull.equations[:, :3], facets, size, tolerance * size)
+    ups, beside = -hull.equations[:, :3], hull.neighbors.astype(int)
+    labels = {geom: label(model, geom) for geom in geoms}
+    return Hull(name, labels, com, *fields, ups, facets, beside, size, tolerance * size)
 
 
 def colliding(model: mujoco.MjModel, index: int) -> list[int]:
@@ -179,9 +162,11 @@ def colliding(model: mujoco.MjModel, index: int) -> list[int]:
 
 def ellipsoids(model: mujoco.MjModel, geoms: Sequence[int]) -> tuple[Indices, Array, Array]:
     """Of which geom each is (N,), its centre (N, 3) and its semi-axes as columns of A (N, 3, 3), body frame [m]."""
-    pieces = [(i, at, half) for i in geoms for centres, half in [_pieces(model, i)] for at in centres]
-    geom, at, half = (np.array(column) for column in zip(*pieces, strict=True))
-    turn = np.array([matrix(model.geom_quat[i]) for i in geom])
+    pieces = [_pieces(model, i) for i in geoms]
+    of = np.repeat(np.arange(len(geoms)), [len(centres) for centres, _ in pieces])
+    turn = np.array([matrix(model.geom_quat[i]) for i in geoms])[of]
+    at = np.concatenate([centres for centres, _ in pieces])
+    half, geom = np.array([half for _, half in pieces])[of], np.array(geoms)[of]
     return geom, model.geom_pos[geom] + np.einsum("nij,nj->ni", turn, at), turn * half[:, None, :]
 
 
@@ -190,9 +175,12 @@ def _pieces(model: mujoco.MjModel, geom: int) -> tuple[Array, Array]:
     size, mesh = model.geom_size[geom], int(model.geom_dataid[geom])
     kind = mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
     if kind == "mesh":
-        graph, vertices = int(model.mesh_graphadr[mesh]), model.mesh_vert[model.mesh_vertadr[mesh] :]
+        start, graph = int(model.mesh_vertadr[mesh]), int(model.mesh_graphadr[mesh])
+        vertices = model.mesh_vert[start : start + int(model.mesh_vertnum[mesh])].astype(float)
+        if graph < 0:
+            return vertices, np.zeros(3)
         count = int(model.mesh_graph[graph])  # the hull that MuJoCo collides with: vertices are after edge addresses
-        return vertices[model.mesh_graph[graph + 2 + count : graph + 2 + 2 * count]].astype(float), np.zeros(3)
+        return vertices[model.mesh_graph[graph + 2 + count : graph + 2 + 2 * count]], np.zeros(3)
     one, ends = np.zeros((1, 3)), np.array([[0.0, 0.0, -size[1]], [0.0, 0.0, size[1]]])
     shapes = {
         "box": (size * list(product((-1.0, 1.0), repeat=3)), np.zeros(3)),

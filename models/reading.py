@@ -1,18 +1,18 @@
-"""Reading a compiled model: mass, inertia, centre of mass and plane of a body, its support and its friction."""
+"""Reading a compiled model: mass, inertia, centre of mass and plane of a body, and what it stands on; placing it."""
 
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+from pivoting.models.forces import JointDrag, read_drag, refuse_unknown_forces
+from pivoting.models.frames import Array, matrix, quaternion
+from pivoting.models.naming import ModelError, body_id
+from pivoting.models.supports import Surface, find_support, support_surface
 
-Array = NDArray[np.float64]
 PLANAR_JOINTS = "two perpendicular slides and then a hinge about their normal"
 JOINTS = f"a free joint, or {PLANAR_JOINTS}"
-
-
-class ModelError(ValueError):
-    """A model, or a body in it, that cannot be served; the message says why and what would be."""
+FILE_FRAME = "pivoting/file"  # a site at the frame that the file gives the body
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +28,10 @@ class RigidBody:
         mass: [kg].  inertia: about the CoM [kg m^2]; in the plane a number, in space (3, 3) in object axes.
         com: (3,) CoM in the body frame [m].
         axes: (4,) quaternion, object axes to body frame.
-        support: id of the geom it stands on.
+        surface: what it stands on.
         table: (4,) quaternion of the table's frame (t, o, n) in the world; t is to the right, n the support's normal.
-        origin: (3,) a point of the support's surface in the world [m].
         gravity: (3,) world axes [m/s^2].
+        drag: damping and friction of its joints, if there is any.
     """
 
     name: str
@@ -41,10 +41,20 @@ class RigidBody:
     inertia: float | Array
     com: Array
     axes: Array
-    support: int
+    surface: Surface
     table: Array
-    origin: Array
     gravity: Array
+    drag: JointDrag | None
+
+    @property
+    def support(self) -> int:
+        """Id of the geom it stands on."""
+        return self.surface.geom
+
+    @property
+    def origin(self) -> Array:
+        """(3,) a point of the support's surface, world axes [m]."""
+        return self.surface.origin
 
     def point(self, contact: ArrayLike) -> Array:
         """(d,) from the CoM in object axes, in the plane along (u, v), of a point given in the body frame.
@@ -65,18 +75,13 @@ class RigidBody:
         raise ModelError(f"contact = {given.tolist()}: must be {allowed}, finite")
 
 
-def matrix(quaternion: Array) -> Array:
-    """(3, 3) rotation matrix of a quaternion (4,)."""
-    out = np.empty(9)
-    mujoco.mju_quat2Mat(out, np.asarray(quaternion, dtype=float))
-    return out.reshape(3, 3)
-
-
-def quaternion(rotation: Array) -> Array:
-    """(4,) quaternion of a rotation matrix (3, 3)."""
-    out = np.empty(4)
-    mujoco.mju_mat2Quat(out, np.ascontiguousarray(rotation).ravel())
-    return out
+def initial_data(model: mujoco.MjModel) -> mujoco.MjData:
+    """The state that the file begins with: its first keyframe, or else qpos0; kinematics are computed."""
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_kinematics(model, data)
+    return data
 
 
 def read_body(model: mujoco.MjModel, name: str, support: str | None = None) -> RigidBody:
@@ -84,16 +89,67 @@ def read_body(model: mujoco.MjModel, name: str, support: str | None = None) -> R
 
     Args:
         model: any compiled model.
-        name: a body at the top level, moving freely or by two slides and a hinge, and nothing hanging on it.
-        support: name of the plane or box geom it stands on; by default the only plane of the world body.
+        name: a body at the top level, moving freely or by two slides and a hinge, and nothing hanging on it; '#id' of
+            one without a name.
+        support: name (or '#id') of the plane, box or upright cylinder it stands on; by default what is under it in the
+            first keyframe, or at qpos0.
 
     Raises:
         ModelError: there is no such body, or it cannot be served.
     """
-    bodies = [model.body(i).name for i in range(1, model.nbody)]
-    if name not in bodies:
-        raise ModelError(f"body = {name!r}: must be one of {', '.join(bodies) or '(the model has none)'}")
-    index = model.body(name).id
+    index = body_id(model, name)
+    dim = degrees_of_freedom(model, index)
+    if (model.body_parentid[1:] == index).any():
+        raise ModelError(f"body = {name!r}: other bodies hang on it; their mass would not be counted")
+    _refuse_flags(model)
+    data = initial_data(model)
+    joints = range(model.body_jntadr[index], model.body_jntadr[index] + model.body_jntnum[index])
+    normal = None
+    if dim == 2:
+        first, second, normal = (data.xaxis[j] for j in joints)
+        if abs(first @ second) > 1e-6 or max(abs(first @ normal), abs(second @ normal)) > 1e-6:
+            raise ModelError(f"body = {name!r}: its joint axes are not perpendicular; needs {PLANAR_JOINTS}")
+    surface = support_surface(model, data, find_support(model, data, index, support))
+    refuse_unknown_forces(model, index, surface.geom)
+    weightless = bool(model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+    gravity = np.zeros(3) if weightless else np.array(model.opt.gravity)
+    table = surface.axes if normal is None else _table_axes(surface.axes[:, 2], normal, gravity)
+    axes = np.eye(3) if normal is None else _object_axes(data.xmat[index].reshape(3, 3).T @ table[:, 1])
+    inertial = matrix(model.body_iquat[index])
+    tensor = inertial @ np.diag(model.body_inertia[index]) @ inertial.T
+    return RigidBody(
+        name=model.body(index).name or f"#{index}",
+        index=index,
+        dim=dim,
+        mass=float(model.body_mass[index]),
+        inertia=float(axes[:, 1] @ tensor @ axes[:, 1]) if dim == 2 else tensor,
+        com=np.array(model.body_ipos[index]),
+        axes=quaternion(axes),
+        surface=surface,
+        table=quaternion(table),
+        gravity=gravity,
+        drag=read_drag(model, data, index),
+    )
+
+
+def file_frame(model: mujoco.MjModel, body: int) -> tuple[Array, Array]:
+    """Origin (3,) and axes (3, 3) of the frame that the MJCF file gives a body of a `Scene`, in the body frame.
+
+    They differ where the compiler moves the frame to the body's inertia: `align` of a free joint.
+    """
+    for site in np.flatnonzero(model.site_bodyid == body):
+        if model.site(int(site)).name == FILE_FRAME:
+            return np.array(model.site_pos[site]), matrix(model.site_quat[site])
+    return np.zeros(3), np.eye(3)
+
+
+def degrees_of_freedom(model: mujoco.MjModel, index: int) -> int:
+    """2 of a body that moves in a plane, 3 of one that moves freely.
+
+    Raises:
+        ModelError: it moves otherwise, or hangs on another.
+    """
+    name = model.body(index).name or f"#{index}"
     joints = range(model.body_jntadr[index], model.body_jntadr[index] + model.body_jntnum[index])
     kinds = [int(model.jnt_type[j]) for j in joints]
     slide, hinge, free = (int(getattr(mujoco.mjtJoint, f"mjJNT_{kind}")) for kind in ("SLIDE", "HINGE", "FREE"))
@@ -104,110 +160,16 @@ def read_body(model: mujoco.MjModel, name: str, support: str | None = None) -> R
     if kinds not in ([slide, slide, hinge], [free]):
         words = ", ".join(mujoco.mjtJoint(kind).name.removeprefix("mjJNT_").lower() for kind in kinds)
         raise ModelError(f"body = {name!r}: its joints are {words}; needs {JOINTS}")
-    if (model.body_parentid[1:] == index).any():
-        raise ModelError(f"body = {name!r}: other bodies hang on it; their mass would not be counted")
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    dim = 3 if kinds == [free] else 2
-    normal = None
-    if dim == 2:
-        first, second, normal = (data.xaxis[j] for j in joints)
-        if abs(first @ second) > 1e-6 or max(abs(first @ normal), abs(second @ normal)) > 1e-6:
-            raise ModelError(f"body = {name!r}: its joint axes are not perpendicular; needs {PLANAR_JOINTS}")
-    _refuse_other_forces(model, name, index, joints)
-    ground = read_support(model, support)
-    if model.body_weldid[model.geom_bodyid[ground]] != 0:
-        raise ModelError(f"support = {model.geom(ground).name!r}: it can move; must be fixed to the world")
-    weightless = bool(model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY)
-    gravity = np.zeros(3) if weightless else np.array(model.opt.gravity)
-    surface = data.geom_xmat[ground].reshape(3, 3)
-    height = model.geom_size[ground, 2] if model.geom_type[ground] == int(mujoco.mjtGeom.mjGEOM_BOX) else 0.0
-    table = surface if normal is None else _table_axes(surface[:, 2], normal, gravity)
-    axes = np.eye(3) if normal is None else _object_axes(data.xmat[index].reshape(3, 3).T @ table[:, 1])
-    inertial = matrix(model.body_iquat[index])
-    tensor = inertial @ np.diag(model.body_inertia[index]) @ inertial.T
-    return RigidBody(
-        name=name,
-        index=index,
-        dim=dim,
-        mass=float(model.body_mass[index]),
-        inertia=float(axes[:, 1] @ tensor @ axes[:, 1]) if dim == 2 else tensor,
-        com=np.array(model.body_ipos[index]),
-        axes=quaternion(axes),
-        support=ground,
-        table=quaternion(table),
-        origin=data.geom_xpos[ground] + height * surface[:, 2],
-        gravity=gravity,
-    )
+    return 3 if kinds == [free] else 2
 
 
-def _refuse_other_forces(model: mujoco.MjModel, name: str, index: int, joints: range) -> None:
-    """The controller knows of gravity, contact and its own wrench; a model that adds other forces is refused."""
-    if model.body_gravcomp[index] != 0.0:
-        raise ModelError(f"body = {name!r}: it has gravcomp = {model.body_gravcomp[index]:g}; must have none")
-    for joint in joints:
-        dofs = slice(model.jnt_dofadr[joint], model.body_dofadr[index] + model.body_dofnum[index])
-        found = {
-            "stiffness": np.abs(np.ravel(model.jnt_stiffness[joint])).max(),
-            "limited": float(model.jnt_limited[joint]),
-            "damping": np.abs(np.ravel(model.dof_damping[dofs])).max(),
-            "frictionloss": np.abs(np.ravel(model.dof_frictionloss[dofs])).max(),
-            "armature": np.abs(np.ravel(model.dof_armature[dofs])).max(),
-        }
-        for attribute, value in found.items():
-            if value != 0.0:
-                raise ModelError(f"body = {name!r}: a joint of it has {attribute} = {value:g}; must have none")
-
-
-def read_support(model: mujoco.MjModel, support: str | None = None) -> int:
-    """Id of the geom that the body stands on: `support`, or else the only plane of the model."""
-    if support is not None:
-        if support not in [model.geom(i).name for i in range(model.ngeom)]:
-            raise ModelError(f"support = {support!r}: the model has no geom of that name")
-        found = int(model.geom(support).id)
-        if int(model.geom_type[found]) not in (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_BOX)):
-            raise ModelError(f"support = {support!r}: must be a plane or a box")
-        return found
-    planes = np.flatnonzero(model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE))
-    if len(planes) != 1:
-        raise ModelError(f"support = None: the model has {len(planes)} planes; name the geom that the body stands on")
-    return int(planes[0])
-
-
-def read_friction(model: mujoco.MjModel, body: int, support: int) -> float:
-    """Sliding friction between the body's geoms and `support`, as MuJoCo combines it: the larger, or by priority.
-
-    Raises:
-        ModelError: the body's geoms differ in it; give mu.
-    """
-    geoms = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
-    ends = zip(model.pair_geom1, model.pair_geom2, strict=True)
-    pairs = {frozenset((int(a), int(b))): i for i, (a, b) in enumerate(ends)}
-    other = int(model.geom_bodyid[support])
-    excluded = {(body << 16) + other, (other << 16) + body} & {int(pair) for pair in model.exclude_signature}
-    found = set()
-    for geom in geoms:
-        pair = pairs.get(frozenset((geom, support)))
-        if pair is not None:
-            if model.pair_dim[pair] < 3:
-                raise ModelError("mu = None: a contact pair without friction (condim 1)")
-            found.add(float(model.pair_friction[pair, 0]))
-            continue
-        meet = (model.geom_contype[geom] & model.geom_conaffinity[support]) or (
-            model.geom_contype[support] & model.geom_conaffinity[geom]
-        )
-        if excluded or not meet:
-            continue
-        if max(model.geom_condim[geom], model.geom_condim[support]) < 3:
-            raise ModelError("mu = None: contact without friction (condim 1)")
-        own, table = model.geom_friction[geom, 0], model.geom_friction[support, 0]
-        order = int(model.geom_priority[geom]) - int(model.geom_priority[support])
-        found.add(float(max(own, table) if order == 0 else own if order > 0 else table))
-    if not found:
-        raise ModelError("support: it and the body never touch (contype, conaffinity or exclude)")
-    if len(found) != 1:
-        raise ModelError(f"mu = None: the body's geoms give {sorted(found)}; give mu")
-    return found.pop()
+def _refuse_flags(model: mujoco.MjModel) -> None:
+    """A model in which nothing can touch cannot be served."""
+    for flag in ("CONTACT", "CONSTRAINT"):
+        if model.opt.disableflags & int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}")):
+            raise ModelError(
+                f'option: <flag {flag.lower()}="disable"/>: nothing sticks without contact; must be enabled'
+            )
 
 
 def place(

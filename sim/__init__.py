@@ -3,7 +3,8 @@
 from pivoting.sim.attach import Attached, ControlError, attach
 from pivoting.sim.loop import simulate
 from pivoting.sim.run import Run
-from pivoting.sim.scenario import SCENARIOS, Scenario, own_object, scenario
+from pivoting.sim.scenario import Scenario
+from pivoting.sim.shipped import SCENARIOS, own_object, scenario
 from pivoting.sim.verdict import Check, Limits, assert_sticking, assert_tracking
 
 __all__ = [

@@ -12,7 +12,11 @@ from pivoting.controller.solution import Solution
 from pivoting.controller.solvers import solve
 from pivoting.controller.space import Motion, quaternion_product
 from pivoting.controller.validate import array, fail
-from pivoting.models.reading import ModelError, RigidBody, matrix, read_body, read_friction
+from pivoting.models.frames import matrix
+from pivoting.models.friction import read_friction
+from pivoting.models.naming import ModelError
+from pivoting.models.reading import RigidBody, read_body
+from pivoting.sim.joint_drag import drag_wrench
 
 Array = NDArray[np.float64]
 
@@ -77,7 +81,9 @@ class Attached:
             ValueError: `reference` is not finite.
         """
         target = reference if isinstance(reference, Motion) else Motion(reference)
-        return solve(self.controller.problem(self.state(data), target))
+        state, omega = self.state(data), self.controller.space.lift_motion(target)[1]
+        known = drag_wrench(self.body, self.controller, self._orientation(data), omega)[0]
+        return solve(self.controller.problem(state, target, external=known))
 
     def wrench(self, data: mujoco.MjData, reference: ArrayLike | Motion) -> Array:
         """(6,) force [N] and torque [N m] at the CoM in world axes: assign it to `data.xfrc_applied[body]`.
@@ -135,7 +141,8 @@ def attach(
     radii = array("radius", np.broadcast_to(radius, len(points)) if np.ndim(radius) == 0 else radius, (len(points),))
     if found.dim == 2 and len(points) != 1:
         raise ModelError(f"contacts = {[p.tolist() for p in points]}: must be one point for a planar body")
-    friction = read_friction(model, found.index, found.support) if mu is None else mu
+    there = None if any(np.size(contact) == 2 for contact in contacts) else np.array(contacts, dtype=float)
+    friction = read_friction(model, found.index, found.support, there) if mu is None else mu
     frame = None if found.dim == 2 else matrix(found.table)
     controller = WrenchController(
         Body(found.mass, found.inertia),

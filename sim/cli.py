@@ -1,7 +1,5 @@
 """The command line: `pivoting example | list | run`. Exit 0 for a pass, 1 for a fail, 2 for bad usage in one line."""
 
-import json
-import os
 import sys
 import tempfile
 from collections.abc import Callable
@@ -79,13 +77,26 @@ def list_scenarios() -> int:
     return 0
 
 
-@cli.command()
+class _RunCommand(click.Command):
+    """`run`, whose help ends with the keys of a scenario, from their declaration."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Called by click last of all."""
+        from pivoting.sim.report import key_help
+
+        for title, rows in key_help():
+            with formatter.section(title):
+                formatter.write_dl(rows)
+
+
+@cli.command(cls=_RunCommand)
 @click.argument("scenario")
 @click.option("--worlds", type=click.IntRange(min=1), default=1, show_default=True, help="How many worlds.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the initial errors.")
 @click.option(
     "--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key, or world.KEY for the world alone."
 )
+@click.option("--limit", "limits", multiple=True, metavar="KEY=VALUE", help="Change a limit of the verdict.")
 @click.option("--model", type=click.Path(path_type=Path), help="An MJCF file of your own, for the scenario pivot.")
 @click.option("--body", help="Name of the body in it that is pivoted.")
 @click.option(
@@ -94,56 +105,66 @@ def list_scenarios() -> int:
 @click.option("--support", help="Name of the plane or box geom that it stands on; by default the only plane.")
 @click.option("--as-modelled", is_flag=True, help="Keep the file's contact and solver parameters.")
 @click.option("--open-loop", is_flag=True, help="Plan the whole motion once and apply that, whatever happens.")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for SCENARIO.rrd and summary.json.")
+@click.option("--out", type=click.Path(), help="Folder for SCENARIO.rrd, SCENARIO.summary.json and summary.json.")
+@click.option("--record-world", type=click.IntRange(min=0), help="Which world is recorded; by default the worst.")
 @json_option("Print the summary as one JSON object and nothing else.")
 def run(
     scenario: str,
     worlds: int,
     seed: int,
     settings: tuple[str, ...],
+    limits: tuple[str, ...],
     open_loop: bool,
-    out: Path | None,
+    out: str | None,
+    record_world: int | None,
     as_json: JsonOutput | None,
     **own: Any,
 ) -> int:
     """Run SCENARIO in closed loop in MuJoCo; exit 0 if the verdict passes, 1 if it fails.
 
     The scenario pivot takes an object of your own: --model FILE.xml --body NAME --contact vertex.
+
+    Below, each key with what it may be and its default, unless the scenario has another. 2w is twice the object's
+    weight as it is believed (of a moment at the lever from contact to centre of mass, of a rate per second), 2T twice
+    its natural time, sqrt(lever / gravity).
     """
     from pivoting.sim.loop import simulate
-    from pivoting.sim.scenario import scenario as find
+    from pivoting.sim.shipped import scenario as find
 
-    case = (_own(**own) if scenario == "pivot" else find(scenario)).change(**_settings(settings))
-    if scenario != "pivot" and any(own.values()):
-        option = next(key for key, value in own.items() if value)
-        raise click.BadParameter(f"--{option.replace('_', '-')}: only the scenario pivot takes it, not {scenario!r}")
-    if out is not None:
-        _make_folder(out)
+    changes: dict[str, Any] = {**_pairs("--set", settings), "limits": _pairs("--limit", limits)}
+    case = (_own(**own) if scenario == "pivot" else find(scenario)).change(**changes)
+    given = [key for key, value in own.items() if value is not None and value is not False]
+    if scenario != "pivot" and given:
+        raise click.BadParameter(f"--{given[0].replace('_', '-')}: only the scenario pivot takes it, not {scenario!r}")
+    if record_world is not None and (out is None or record_world >= worlds):
+        allowed = "given with --out" if out is None else f"less than {worlds}, the number of worlds"
+        raise click.BadParameter(f"--record-world {record_world}: must be {allowed}")
+    folder = None if out is None else _make_folder(out)
     with _progress(f"{scenario}, {worlds} world{'s' * (worlds > 1)}") as report:
         finished = simulate(case, worlds, seed, progress=report, open_loop=open_loop)
 
     from pivoting.sim.report import jsonable, print_run
 
-    summary = jsonable(finished.summary())
-    wrote = None
-    if out is not None:  # before it is told: who is told may have gone
-        from pivoting.sim.recording import record
+    also: dict[str, Any] = {}
+    if finished.verdict == "fail" and not open_loop:
+        from pivoting.sim.advice import tried
 
-        world = int(finished.failed_worlds[0]) if finished.failed_worlds.size else 0
-        partial = out / f".summary.json.{os.getpid()}.part"
-        try:
-            partial.write_text(json.dumps(summary, allow_nan=False, indent=1) + "\n")
-            recording = record(finished, out / f"{scenario}.rrd", world=world)
-            partial.replace(out / "summary.json")
-        finally:
-            partial.unlink(missing_ok=True)
-        wrote = f"wrote {out / 'summary.json'}; world {world} in {recording}, see it with: rerun {recording}"
+        also["holds"] = tried(finished, simulate)
+    saved = None
+    if folder is not None:  # before it is told: who is told may have gone
+        from pivoting.sim.results import save
+
+        saved = save(finished, folder, record_world, also=also)
     if as_json:
-        as_json(summary)
+        as_json(jsonable({**finished.summary(), **also}) if saved is None else saved.summary)
     else:
         print_run(console(), finished)
-    if wrote is not None:
-        click.echo(wrote)  # under --json on stderr, as all else
+        if also.get("holds"):
+            click.echo(f"what would hold it: {also['holds']['setting']} ({also['holds']['why']}; tried, it passes)")
+        elif also:
+            click.echo("what would hold it was not found; `remedies` in the summary lists what its figures suggest")
+    for line in () if saved is None else saved.said:
+        click.echo(line)  # under --json on stderr, as all else
     return 1 if finished.verdict == "fail" else 0
 
 
@@ -185,12 +206,14 @@ def _refuse(message: str) -> int:
     return 2
 
 
-def _settings(pairs: tuple[str, ...]) -> dict[str, Any]:
-    out = {}
+def _pairs(option: str, pairs: tuple[str, ...]) -> dict[str, str]:
+    out: dict[str, str] = {}
     for pair in pairs:
         key, equals, value = pair.partition("=")
         if not equals or not key or not value:
-            raise click.BadParameter(f"--set {pair!r}: must be KEY=VALUE")
+            raise click.BadParameter(f"{option} {pair!r}: must be KEY=VALUE")
+        if key in out:
+            raise click.BadParameter(f"{option} {pair!r}: {key} is already given as {out[key]}")
         out[key] = value
     return out
 
@@ -199,14 +222,14 @@ def _own(
     model: Path | None, body: str | None, contact: str | None, support: str | None, as_modelled: bool
 ) -> "Scenario":
     """The scenario of an object of one's own."""
-    from pivoting.sim.scenario import own_object
+    from pivoting.sim.shipped import own_object
 
     for option, value in (("--model", model), ("--body", body)):
         if value is None:
             raise click.BadParameter(f"{option} is missing: pivot needs --model FILE.xml --body NAME")
     assert model is not None
     assert body is not None
-    where: str | list[list[float]] = contact or "lowest"
+    where: str | list[list[float]] = "lowest" if contact is None else contact
     if contact is not None and "," in contact:
         try:
             where = [[float(number) for number in point.split(",")] for point in contact.split(";")]
@@ -215,16 +238,18 @@ def _own(
     return own_object(model, body, where, support=support, chosen=not as_modelled)
 
 
-def _make_folder(out: Path) -> None:
+def _make_folder(name: str) -> Path:
     """Find out before the work that its results can be kept."""
-    if not out.name or (out.exists() and not out.is_dir()):
-        raise click.BadParameter(f"--out {str(out)!r}: must be a folder")
+    out = Path(name)
+    if not name or (out.exists() and not out.is_dir()):
+        raise click.BadParameter(f"--out {name!r}: must be a folder")
     try:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out):
             pass
     except OSError as error:
-        raise click.BadParameter(f"--out {str(out)!r}: must be a folder that can be written to ({error})") from None
+        raise click.BadParameter(f"--out {name!r}: must be a folder that can be written to ({error})") from None
+    return out
 
 
 def _check_figure(figure: Path) -> None:

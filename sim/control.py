@@ -31,8 +31,12 @@ class States(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """Where the answers of one step are written: wrench (W, nw), force (W, K d), residual (W,), status (W,)."""
+    """Where the answers of one step are written.
 
+    required: (W, nw), what the problems were stated with.  wrench: (W, nw).  force: (W, K d).  residual, status: (W,).
+    """
+
+    required: Array
     wrench: Array
     force: Array
     residual: Array
@@ -57,11 +61,13 @@ class _Law:
     def __init__(self, controller: WrenchController, bounds: WrenchBounds):
         self._belief, self._work = controller.belief, controller.workspace()
         self._bounds = bounds.stacked(len(controller.Q_w))
+        self._none = np.zeros((1, len(controller.Q_w)))
 
-    def __call__(self, states: States, desired: list[Array], out: Answers) -> None:
-        """`desired`: orientations, angular velocities and accelerations, see `step_worlds`."""
+    def __call__(self, states: States, desired: list[Array], out: Answers, external: Array | None = None) -> None:
+        """`desired`: orientations, angular velocities, accelerations; `external`: see `step_worlds`, None for none."""
         measured = states.orientation, states.angular_velocity
-        step_worlds(self._belief, self._bounds, self._work, TOLERANCE, *measured, *desired, *out)
+        known = self._none if external is None else external
+        step_worlds(self._belief, self._bounds, self._work, TOLERANCE, *measured, *desired, known, *out)
 
 
 class LawControl:
@@ -70,13 +76,21 @@ class LawControl:
     Args:
         desired: (N+1, 4), (N+1, 3), (N+1, 3), the reference at every step.
         bounds: on the wrench.
+        external: (N+1, nw) known wrenches on the object at every step, object axes; or (1, nw), always the same.
     """
 
-    def __init__(self, controller: WrenchController, desired: tuple[Array, Array, Array], bounds: WrenchBounds):
-        self._law, self._desired = _Law(controller, bounds), desired
+    def __init__(
+        self,
+        controller: WrenchController,
+        desired: tuple[Array, Array, Array],
+        bounds: WrenchBounds,
+        external: Array,
+    ):
+        self._law, self._desired, self._external = _Law(controller, bounds), desired, external
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
-        self._law(states, [values[k : k + 1] for values in self._desired], out)
+        j = min(k, len(self._external) - 1)
+        self._law(states, [values[k : k + 1] for values in self._desired], out, self._external[j : j + 1])
 
     def prepare(self, states: States, out: Answers) -> None:
         """Compile."""
@@ -91,7 +105,7 @@ class BoundedControl:
     """
 
     def __init__(self, inner: Control, controller: WrenchController, bounds: WrenchBounds, dt: float):
-        self._inner, self._controller, self._dt = inner, controller, dt
+        self._inner, self._dt = inner, dt
         self._bounds = bounds.stacked(len(controller.Q_w))
         self._rated = bounds.rated
         self._solve = BoundedSolver(controller, bounds, dt)
@@ -104,8 +118,7 @@ class BoundedControl:
         if not most > OVER:
             return
         for i in np.flatnonzero(excess > OVER):
-            required = self._controller.jacobian(states.orientation[i]) @ out.force[i] + out.wrench[i]
-            answer = self._solve(states.orientation[i], required, None if last is None else last[i])
+            answer = self._solve(states.orientation[i], out.required[i], None if last is None else last[i])
             if not answer.residual <= BETTER_THAN_NONE:
                 out.wrench[i], out.status[i] = np.nan, FAILED
                 continue
@@ -120,8 +133,7 @@ class BoundedControl:
         self._inner.prepare(states, out)
         fill_excess(self._bounds, out.wrench, out.wrench, self._dt, np.empty(len(out.wrench)))
         for _ in range(2):  # set up, then in place
-            jacobian = self._controller.jacobian(states.orientation[0])
-            self._solve(states.orientation[0], jacobian @ out.force[0] + out.wrench[0])
+            self._solve(states.orientation[0], out.required[0])
 
 
 def _applied(wrench: Array | None) -> Array | None:
@@ -258,7 +270,8 @@ class PlayControl:
     """Open loop: one plan of the whole motion, its wrenches applied in object axes whatever the object does.
 
     Args:
-        planner: of as many steps as the run has, `per` time steps each.
+        planner: of as many steps as the run has, `per` time steps each.  What is required is what its wrenches and
+            forces make together on the object as it is.
         reference: of the orientation, as the controller believes it.
     """
 
@@ -284,4 +297,6 @@ class PlayControl:
         assert self.plan is not None
         t = k // self._per
         out.wrench[:], out.force[:] = self.plan.wrench[t], self.plan.force[t].ravel()
+        for i, orientation in enumerate(states.orientation):
+            out.required[i] = self.plan.horizon.controller.jacobian(orientation) @ out.force[i] + out.wrench[i]
         out.residual[:], out.status[:] = self.plan.residual, 0

@@ -1,5 +1,6 @@
 """The notes' second figure as a picture: wrench space with the cone and the optimum, and the forces that it weighs."""
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +11,13 @@ from pivoting.controller.solution_space import solution_space
 ORANGE, BLUE, BLACK, RED, GREEN = "#e08a1e", "#2f6db3", "#222222", "#c0392b", "#2e8b57"
 
 
-def draw_solution_space(solution: Solution, path: Path, title: str = "") -> Path:
+def draw_solution_space(solution: Solution, path: str | os.PathLike[str], title: str = "") -> Path:
     """Draw a solved planar problem with one contact; written whole or not at all, in the format of the file's ending.
 
     Left: wrench space (object axes). Orange, what the contact can do, J f; blue, the applied wrenches that balance,
     required - J f. Right: the same problem in the contact force alone, with level sets of its cost.
     """
+    path = Path(path)
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -37,7 +39,9 @@ def draw_solution_space(solution: Solution, path: Path, title: str = "") -> Path
 def _draw_wrenches(axes: Any, solution: Solution) -> None:
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    space = solution_space(solution, reach=1.7 * max(float(solution.force[0, 1]), 1e-9))
+    problem, force = solution.problem, solution.force[0]
+    given = problem.jacobian, float(problem.mu_planned[0]), float(problem.f_min[0]), problem.required
+    space = solution_space(*given, solution.wrench, force, reach=1.7 * max(float(force[1]), 1e-9))
     for polygon, colour in ((space.cone, ORANGE), (space.admissible, BLUE)):
         axes.add_collection3d(Poly3DCollection([polygon], facecolor=colour, edgecolor=colour, alpha=0.3))
     origin = np.zeros(3)

@@ -8,8 +8,8 @@ from typing import Any
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.controller.solvers import Solution, solve
-from pivoting.controller.space import Motion
+from pivoting.controller.solution_space import SolutionSpace, solution_space
+from pivoting.sim.control import FAILED
 from pivoting.sim.run import Run
 from pivoting.sim.solids import Solid, body_solids
 
@@ -48,13 +48,28 @@ class Film:
         self.stream.send_columns(entity, [seconds, steps], columns.partition(each * there))
 
     def arrows(
-        self, entity: str, rows: Rows, vectors: Array, colour: Colour, width: float, label: str, at: float = 1.0
+        self,
+        entity: str,
+        rows: Rows,
+        vectors: Array,
+        colour: Colour,
+        width: float,
+        label: str,
+        at: float = 1.0,
+        origins: Array | None = None,
     ) -> None:
-        """Send arrows (R, 3) from the entity's origin, with a label just past the share `at` of their length."""
+        """Send arrows (R, 3) with a label just past the share `at` of their length.
+
+        They start at `origins` (R, 3), or else at the entity's.
+        """
         self.still(entity, self.rr.Arrows3D.from_fields(colors=[colour], radii=[width]), self.label(label, colour))
-        self.send(entity, rows, self.rr.Arrows3D, vectors=vectors)
-        past = at + 4.0 * width / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), width)
-        self.send(entity, rows, self.rr.Points3D, positions=vectors * past)
+        past = vectors * (at + 4.0 * width / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), width))
+        if origins is None:
+            self.send(entity, rows, self.rr.Arrows3D, vectors=vectors)
+            self.send(entity, rows, self.rr.Points3D, positions=past)
+        else:
+            self.send(entity, rows, self.rr.Arrows3D, vectors=vectors, origins=origins)
+            self.send(entity, rows, self.rr.Points3D, positions=origins + past)
 
     def label(self, text: str, colour: Colour, at: Array | None = None) -> Any:
         """A word at the position `at` (3,), or else at positions that are sent as a column."""
@@ -101,10 +116,25 @@ class Film:
         return body_solids(self.model, self.run.truth)
 
     @cached_property
+    def block(self) -> bool:
+        """Whether it is the planar scenes' block: one box about its CoM, whose depth says nothing."""
+        if self.dim == 3 or len(self.solids) != 1:
+            return False
+        far = np.abs(self.solids[0].vertices)
+        return bool(np.allclose(far, far.max(axis=0)))
+
+    @cached_property
     def side(self) -> float:
-        """Side of the block, the longest of a body in space [m]."""
-        points = [self.run.points] if self.dim == 2 else [solid.vertices for solid in self.solids]
-        return 2.0 * float(np.abs(np.concatenate(points)).max())
+        """Side of the block, the longest of any other body, in the plane that it moves in [m]."""
+        points = np.abs(np.concatenate([solid.vertices for solid in self.solids]))
+        return 2.0 * float((points[:, [0, 2]] if self.dim == 2 else points).max())
+
+    @cached_property
+    def depth(self) -> float:
+        """From the plane of motion to the nearest face of the block, as it is drawn [m]."""
+        if self.block:
+            return 0.5 * DEPTH * self.side
+        return float(np.abs(np.concatenate([solid.vertices for solid in self.solids])[:, 1]).max())
 
     @property
     def length(self) -> float:
@@ -116,7 +146,7 @@ class Film:
     def scale(self) -> float:
         """Length of a drawn force [m/N]: m g is half a side, or less if the run's forces would pass 0.8 sides."""
         wrench, i = self.run.wrench[self.world], self.dim
-        drawn = [wrench[:, :i], *np.moveaxis(self.run.force[self.world], 1, 0)]
+        drawn = [wrench[:, :i], *np.moveaxis(self.force, 1, 0)]
         drawn += [wrench[:, i:] / self.length] * (i == 3)
         largest = max(usual(np.linalg.norm(each[: self.answers], axis=1)) for each in drawn)
         return 0.5 * self.side / max(float(np.linalg.norm(self.weight)), 0.625 * largest, 1e-9)
@@ -129,7 +159,7 @@ class Film:
     @property
     def front(self) -> Array:
         """(3,) from the plane of motion to the one before the block that arrows are drawn in; nothing in space [m]."""
-        return -self.away * (0.5 * DEPTH + 0.02) * self.side * (self.dim == 2)
+        return -self.away * (self.depth + 0.02 * self.side) * (self.dim == 2)
 
     @property
     def weight(self) -> Array:
@@ -160,18 +190,40 @@ class Film:
         return self.run.truth.origin + self.run.table_axes @ self.start + 0.62 * self.side * UP
 
     @cached_property
-    def solutions(self) -> dict[int, Solution]:
-        """Step -> its problem, stated and solved again, for the answered steps whose wrench space is drawn."""
-        run, i, problem = self.run, self.world, self.run.attached.controller.problem
-        theta, omega, wanted = run.theta[i], run.omega[i], np.transpose(run.reference)
-        rows = [k for k in self.rows(self.answers, SPACE) if run.status[i, k] == 0]
-        return {k: solve(problem(Motion(theta[k], omega[k]), Motion(*wanted[k]))) for k in rows}
+    def force(self) -> Array:
+        """(N, K, d) predicted contact forces; nan where there was no answer that predicts any [N]."""
+        unanswered = self.run.status[self.world] == FAILED
+        return np.where(unanswered[:, None, None], np.nan, self.run.force[self.world])
+
+    @cached_property
+    def space_rows(self) -> Rows:
+        """The answered steps whose wrench space is drawn."""
+        return self.rows(self.answers, SPACE)
+
+    @cached_property
+    def space(self) -> SolutionSpace:
+        """Of these steps, from the log alone: the pose that the controller saw, what was required, what was applied.
+
+        Without an answer (nan) nothing was applied, and of the contact nothing is known.
+        """
+        run, i, rows, controller = self.run, self.world, self.space_rows, self.run.attached.controller
+        unanswered = run.status[i, rows, None] == FAILED
+        return solution_space(
+            np.array([controller.jacobian(q) for q in run.quaternion[i, rows]]),
+            float(self.planned_mu[0]),
+            controller.contacts[0].f_min,
+            run.required[i, rows],
+            np.where(unanswered, 0.0, run.wrench[i, rows]),
+            self.force[rows, 0],
+            self.reach,
+        )
 
     @cached_property
     def reach(self) -> float:
         """Largest normal force in the picture of the wrench space, and half the picture's size [N]."""
-        sizes = [max(np.linalg.norm(each.problem.required[:2]), each.force[0, 1]) for each in self.solutions.values()]
-        return 1.25 * float(max(sizes, default=1.0))
+        run, i, rows = self.run, self.world, self.space_rows
+        planar = run.required[i, rows, :2], run.wrench[i, rows, :2], self.force[rows, 0]
+        return 1.25 * max(*(usual(np.linalg.norm(each, axis=-1)) for each in planar), 1e-9)
 
 
 def usual(values: Array) -> float:

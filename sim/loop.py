@@ -1,32 +1,47 @@
-"""The closed loop, over a leading world axis: read the state, solve, apply, step. Judged when it is over."""
+"""A closed-loop run, from a scenario to what is measured: the world, the belief, the start, the steps."""
 
-from collections.abc import Callable
-from time import perf_counter, perf_counter_ns
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
-from pivoting.controller.controller import WrenchController, world_wrench
+from pivoting.controller.controller import WrenchController
 from pivoting.controller.rotations import Turn
 from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product, space
 from pivoting.controller.validate import fail
-from pivoting.models.reading import RigidBody, matrix, place, read_friction, turn
-from pivoting.models.scenes import compiled, instrument, load
+from pivoting.models.contact_settings import contact_settings
+from pivoting.models.frames import matrix
+from pivoting.models.friction import read_friction
+from pivoting.models.given import NEAR
+from pivoting.models.naming import ModelError
+from pivoting.models.reading import initial_data, place, read_body, turn
+from pivoting.models.scenes import Scene, load
+from pivoting.models.sensors import instrument
+from pivoting.models.supports import body_size
 from pivoting.sim.attach import Attached, attach
+from pivoting.sim.contact_readings import Declared
 from pivoting.sim.control import Answers, BoundedControl, Control, LawControl, States
 from pivoting.sim.engine_log import engine_log
-from pivoting.sim.fidelity import ContactRows, read_rows
+from pivoting.sim.fidelity import read_rows
+from pivoting.sim.joint_drag import drag_wrench
 from pivoting.sim.keys import CONTROL_KEYS
-from pivoting.sim.plan import Plan, planned
+from pivoting.sim.plan import Plan, planned, transplanted
 from pivoting.sim.planning import horizon_control, play_control
-from pivoting.sim.run import Run
-from pivoting.sim.scenario import Scenario, scenario
+from pivoting.sim.run import Run, frozen
+from pivoting.sim.scenario import Scenario
+from pivoting.sim.shipped import scenario
+from pivoting.sim.stepping import ContactLog, run_steps
+from pivoting.sim.strays import contact_margin, refuse_strays
 
 Array = NDArray[np.float64]
 START_DEPTH = 1e-6  # of the lever from contact to CoM: there is contact from the first step on
+DEEPEST = 1e-2  # likewise, that an object is put at rest in its support
+PRESSED, SAMPLES = 1e-3, 17  # levers that it is pressed in, and where along its way, to see what it touches with
+Samples = tuple[Array, Array, Array]  # orientations, angular velocities and accelerations
 MAX_STEPS = 10_000_000  # worlds times steps that are kept in memory, about 0.5 kB each
 
 
@@ -63,22 +78,21 @@ def simulate(
     for key, value, least in (("worlds", worlds, 1), ("seed", seed, 0)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
             raise fail(key, value, f"a whole number >= {least}")
-    if case.gravity == 0.0 and case.f_min == 0.0:
-        raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the corner on the table")
-    attached, believed = believe(case, controller)
-    spec = load(case.path, case.actual, body=case.body, support=case.support, chosen=case.chosen)
-    bare = compiled(spec)
-    plan = planned(case, bare)
-    truth = plan.body
-    model, where = instrument(spec, truth, bare.geom(truth.support).name, plan.contacts)
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that diverges is seen, not reset
-    # bodies of several geoms: a plane's bounding box is 5e9 m deep there, and misses contacts of less than 1e-6 m
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+    scene = load(case.path, body=case.body, support=case.support, chosen=case.chosen)
+    attached, believed = believe(case, controller, scene)
+    asked, case = case, case.absolute(believed.load)
+    world = scene.changed(case.actual)
+    model, where = _instrumented(world)
+    truth = read_body(model, world.body, world.support)
+    plan = transplanted(believed, model, truth, world.scale / scene.changed(case.believed).scale)
     dt = float(model.opt.timestep)
     steps = round(case.duration / dt)
-    if steps < 2 or steps * worlds > MAX_STEPS:
-        allowed = f"such that {worlds} worlds take 2 to {MAX_STEPS} steps together, at dt = {dt:g} s"
-        raise fail("seconds", case.duration, allowed)
+    if not 2 <= steps <= MAX_STEPS:
+        raise fail("seconds", case.duration, f"such that a world takes 2 to {MAX_STEPS} steps, at dt = {dt:g} s")
+    if steps * worlds > MAX_STEPS:
+        raise fail(
+            "worlds", worlds, f"at most {MAX_STEPS // steps}: of {steps} steps each, more are not kept in memory"
+        )
     if steps * dt <= case.limits.settle_s:
         raise fail("seconds", case.duration, f"more than the {case.limits.settle_s:g} s that the verdict lets settle")
     time: Array = dt * np.arange(steps + 1, dtype=float)
@@ -87,58 +101,81 @@ def simulate(
     told, follow = _desired(case, believed, time)[1:]
     for values in (time, *reference, *desired):
         values.flags.writeable = False
+    pressed = list(_pressed(model, plan, desired[0][np.linspace(0, steps, SAMPLES).astype(int)]))
+    settings = None
+    if case.chosen and not {"timeconst", "impedance"} & set(case.actual):
+        settings = contact_settings(model, truth.index, truth.support, pressed, dt)
+        model, where = _instrumented(world.with_contacts(settings))
+    rows = read_rows(model, truth.index, truth.support, pressed)
 
     batch = Batch(model, int(worlds), nthread=1 if worlds == 1 else 0, persistent=True)
     errors = np.deg2rad(case.spread) * np.random.default_rng(seed).uniform(-1.0, 1.0, int(worlds))
-    rows = _start(batch, model, plan, desired, errors)
+    bounds = case.bounds()
+    drag = drag_wrench(attached.body, attached.controller, *told[:2])
+    depth = 0.0
+    if case.chosen and rows is not None:
+        first = _load(attached.controller, LawControl(attached.controller, told, bounds, drag), told)
+        depth = float(rows.depth(np.array(first / rows.points)))
+    _start(batch, model, plan, desired, errors, depth)
     start = (np.array(batch.bind("qpos")), np.array(batch.bind("qvel")))
     for values in start:
         values.flags.writeable = False
 
-    bounds = case.bounds()
-    control: Control = LawControl(attached.controller, told, bounds)
+    control: Control = LawControl(attached.controller, told, bounds, drag)
     horizons = played = None
+    if attached.body.drag is not None and (open_loop or case.plan_hz is not None):
+        raise ModelError(f"body = {attached.body.name!r}: a plan knows no joint damping or friction; must have none")
     if open_loop:
         control = played = play_control(case, attached, believed, follow, dt, steps)
     elif case.plan_hz is not None:
         control = horizons = horizon_control(case, attached, believed, follow, int(worlds), dt, steps)
     if bounds.any and not open_loop:  # a plan is within them
         control = BoundedControl(control, attached.controller, bounds, dt)
-    with engine_log() as warned:
-        log = _loop(batch, control, attached.controller, truth, where, steps, progress)
     K, d = len(plan.contacts), truth.dim
-    read = {key: log.sensors[..., columns] for key, columns in where.items()}
-    forces = [read["contact"]] if K == 1 else [read[f"contact {i}"] for i in range(K)]
+    declared = Declared(
+        points=np.array([space(d).lift(truth.point(contact)) for contact in plan.contacts]),
+        up=plan.radius[:, None] * matrix(truth.table)[:, 2],
+        across=matrix(truth.table)[:, : d - 1],
+        near=NEAR * body_size(model, truth.index),
+        landing=case.limits.contacts_end > 0,
+    )
+    contacts = ContactLog(declared, rows, matrix(truth.table), where, steps, int(worlds))
+    with engine_log() as warned:
+        log = run_steps(batch, control, attached.controller, contacts, truth.index, where, steps, progress)
     axes = matrix(truth.table) @ space(d).force_map
-    measured = np.stack([force[1:, :, 1:4] @ axes for force in forces], axis=2)
     return Run(
-        scenario=case,
+        scenario=asked,
         seed=int(seed),
         attached=attached,
+        load=believed.load,
+        replaced=world.replaced,
+        settings=settings,
         model=model,
         truth=truth,
-        points=np.array([space(d).lift(truth.point(contact)) for contact in plan.contacts]),
+        declared=declared,
         radius=plan.radius,
         face=np.array([space(d).lift(truth.point(corner)) for corner in plan.face]),
         turn=(plan.axis, plan.start),
-        mu_world=read_friction(model, truth.index, truth.support),
+        mu_world=read_friction(model, truth.index, truth.support, plan.contacts),
         contact_rows=rows,
         start=start,
         time=time,
         reference=reference,
         desired=desired,
-        position=_worlds_first(read["position"]),
-        quaternion=_worlds_first(read["quaternion"]),
-        velocity=_worlds_first(read["velocity"]),
-        angular_velocity=_worlds_first(read["angular_velocity"]),
-        wrench=_worlds_first(log.wrench),
-        wrench_world=_worlds_first(log.wrench_world),
-        force=_worlds_first(log.force).reshape(worlds, steps, K, d),
-        force_measured=_worlds_first(measured),
-        contacts_found=_worlds_first(read["contact"][1:, :, 0]),
-        residual=_worlds_first(log.residual),
-        status=_worlds_first(log.status),
-        control_us=_worlds_first((log.control_ns / (1e3 * worlds))[:, None])[0],
+        position=log.states.position,
+        quaternion=log.states.orientation,
+        velocity=log.states.velocity,
+        angular_velocity=log.states.angular_velocity,
+        required=log.answers.required,
+        wrench=log.answers.wrench,
+        wrench_world=log.wrench_world,
+        force=log.answers.force.reshape(worlds, steps, K, d),
+        force_measured=frozen(log.contacts.force @ axes),
+        contacts=log.contacts,
+        held=log.held,
+        residual=log.answers.residual,
+        status=log.answers.status,
+        control_us=frozen(log.control_ns / (1e3 * worlds)),
         wall_s=log.wall_s,
         plan=None if played is None else played.plan,
         plans=None if horizons is None else horizons.log,
@@ -148,37 +185,85 @@ def simulate(
     )
 
 
+def _instrumented(world: Scene) -> tuple[mujoco.MjModel, dict[str, slice]]:
+    """The model that is simulated, and where each reading is in its sensordata."""
+    model, where = instrument(world)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that diverges is seen, not reset
+    # bodies of several geoms: a plane's bounding box is 5e9 m deep there, and misses contacts of less than 1e-6 m
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+    return model, where
+
+
+def _pressed(model: mujoco.MjModel, plan: Plan, orientations: Array) -> Iterator[Array]:
+    """The qpos of the object pressed on its contact at each of these orientations (S, 4)."""
+    data, up, point = initial_data(model), matrix(plan.body.table)[:, 2], plan.contacts[0]
+    lever = float(np.linalg.norm(plan.body.com - point) + plan.radius[0])
+    for orientation in orientations:
+        place(model, data, plan.body, orientation, point, plan.at + (plan.radius[0] - PRESSED * lever) * up)
+        yield np.array(data.qpos)
+
+
+def _load(controller: WrenchController, law: LawControl, told: Samples) -> float:
+    """The normal force [N] on all contacts with which the law begins."""
+    states = States(np.zeros((1, 3)), told[0][:1], np.zeros((1, 3)), told[1][:1])
+    nw, d, K = len(controller.Q_w), controller.space.dim, len(controller.contacts)
+    out = Answers(np.empty((1, nw)), np.empty((1, nw)), np.empty((1, K * d)), np.empty(1), np.empty(1, np.int8))
+    law(0, states, None, out)
+    return float(out.force.reshape(K, d)[:, -1].sum())
+
+
 def _start(
-    batch: Batch, model: mujoco.MjModel, plan: Plan, desired: tuple[Array, Array, Array], errors: Array
-) -> ContactRows | None:
-    """Put every world on its contact, off the reference by `errors` (W,) [rad]; its contact rows."""
+    batch: Batch,
+    model: mujoco.MjModel,
+    plan: Plan,
+    desired: tuple[Array, Array, Array],
+    errors: Array,
+    depth: float,
+) -> None:
+    """Put every world on its contact, off the reference by `errors` (W,) [rad].
+
+    Everything else is where the model's first keyframe, or else qpos0, has it.
+
+    Args:
+        depth: at which it rests under its load; one that has less to carry at first would slide [m].
+
+    Raises:
+        ModelError: the object would touch something else there; it is named.
+    """
     body = plan.body
-    data, up, point = mujoco.MjData(model), matrix(body.table)[:, 2], plan.contacts[0]
+    data, up, point = initial_data(model), matrix(body.table)[:, 2], plan.contacts[0]
     lever = float(np.linalg.norm(body.com - point) + plan.radius[0])
-    at = plan.at + (plan.radius[0] - START_DEPTH * lever) * up
-    for qpos, qvel, error in zip(batch.bind("qpos"), batch.bind("qvel"), errors, strict=True):
-        place(model, data, body, quaternion_product(exponential(error * plan.axis), desired[0][0]), point, at)
-        touching = point - plan.radius[0] * up @ data.xmat[body.index].reshape(3, 3)
-        turn(model, data, body, desired[1][0], touching)
-        qpos[:], qvel[:] = data.qpos, data.qvel
-    mujoco.mj_forward(model, data)
-    return read_rows(model, data, body.index, body.support)
+    depth = float(np.clip(depth, START_DEPTH * lever, DEEPEST * lever))
+    kind, floats = int(mujoco.mjtState.mjSTATE_INTEGRATION), 0.0
+    state = np.empty(mujoco.mj_stateSize(model, kind))
+    for row, error in zip(batch.state, errors, strict=True):
+        for _ in range(2):  # a contact with a margin holds the body above the table: how far, only MuJoCo knows
+            at = plan.at + (plan.radius[0] + floats - depth) * up
+            place(model, data, body, quaternion_product(exponential(error * plan.axis), desired[0][0]), point, at)
+            touching = point - plan.radius[0] * up @ data.xmat[body.index].reshape(3, 3)
+            turn(model, data, body, desired[1][0], touching)
+            mujoco.mj_forward(model, data)
+            if floats or not (floats := contact_margin(model, data, body)):
+                break
+        refuse_strays(model, data, body)
+        mujoco.mj_getState(model, data, state, kind)
+        row[:] = state
 
 
-def believe(case: Scenario, controller: WrenchController | None = None) -> tuple[Attached, Plan]:
+def believe(
+    case: Scenario, controller: WrenchController | None = None, scene: Scene | None = None
+) -> tuple[Attached, Plan]:
     """The controller of a scenario (or another) attached to the world that the scenario believes in, and its plan."""
-    nominal = compiled(load(case.path, case.believed, body=case.body, support=case.support, chosen=case.chosen))
+    read = scene or load(case.path, body=case.body, support=case.support, chosen=case.chosen)
+    believed = read.changed(case.believed)
+    nominal = believed.compile()
+    case = replace(case, body=believed.body, support=believed.support)
     plan = planned(case, nominal)
     if controller is not None:
-        if not isinstance(controller, WrenchController):
-            raise fail("controller", controller, "a WrenchController")
-        if [contact.dim for contact in controller.contacts] != [plan.body.dim] * len(plan.contacts):
-            kind = "planar" if plan.body.dim == 2 else "spatial"
-            given = f"one with {len(controller.contacts)} contacts in dimension {controller.space.dim}"
-            raise fail("controller", given, f"of {len(plan.contacts)} {kind} contact{'s' * (len(plan.contacts) > 1)}")
-        ignored = [key for key in CONTROL_KEYS if key in case.changes]
-        if ignored:
-            raise fail(ignored[0], case.changes[ignored[0]], "left out: the controller that is given has its own")
+        _check(controller, case, plan)
+    if plan.load.force == 0.0 and (case.f_min if controller is None else controller.belief.f_min.max()) == 0.0:
+        raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the object on its support")
+    if controller is not None:
         return Attached(nominal, plan.body, controller), plan
     attached = attach(
         nominal,
@@ -188,14 +273,30 @@ def believe(case: Scenario, controller: WrenchController | None = None) -> tuple
         law=case.control_law(),
         mu=case.mu,
         margin=case.margin,
-        f_min=case.f_min,
+        f_min=float(case.absolute(plan.load).f_min),
         Q_w=case.wrench_weight(plan.body.dim),
         support=case.support,
     )
     return attached, plan
 
 
-Samples = tuple[Array, Array, Array]
+def _check(controller: WrenchController, case: Scenario, plan: Plan) -> None:
+    """Refuse a controller that is not of these contacts, or that the loop would not ask."""
+    if not isinstance(controller, WrenchController):
+        raise fail("controller", controller, "a WrenchController")
+    if [contact.dim for contact in controller.contacts] != [plan.body.dim] * len(plan.contacts):
+        kind = "planar" if plan.body.dim == 2 else "spatial"
+        given = f"one with {len(controller.contacts)} contacts in dimension {controller.space.dim}"
+        raise fail("controller", given, f"of {len(plan.contacts)} {kind} contact{'s' * (len(plan.contacts) > 1)}")
+    for name in ("problem", "jacobian"):
+        if getattr(getattr(controller, name), "__func__", None) is not getattr(WrenchController, name):
+            allowed = (
+                f"without a {name}() of its own: the compiled loop states the problems of all worlds from `belief`"
+            )
+            raise fail("controller", type(controller).__name__, allowed + ", and would never call it")
+    ignored = [key for key in CONTROL_KEYS if key in case.changes]
+    if ignored:
+        raise fail(ignored[0], case.changes[ignored[0]], "left out: the controller that is given has its own")
 
 
 def _desired(case: Scenario, plan: Plan, time: Array) -> tuple[Samples, Samples, Turn]:
@@ -216,69 +317,3 @@ def _desired(case: Scenario, plan: Plan, time: Array) -> tuple[Samples, Samples,
     turn = Turn(case.motion, plan.axis, plan.start)
     q, omega, alpha = (np.array(values, dtype=float) for values in turn(time))
     return (angle, rate, acceleration), (q, omega, alpha), turn
-
-
-class _Log(NamedTuple):
-    """What the loop keeps, time first: sensors (N+1, W, ...), answers (N, W, ...), control_ns (N,), wall_s."""
-
-    sensors: Array
-    wrench: Array
-    wrench_world: Array
-    force: Array
-    residual: Array
-    status: NDArray[np.int8]
-    control_ns: Array
-    wall_s: float
-
-
-def _worlds_first(values: NDArray[Any]) -> NDArray[Any]:
-    """(step, world, ...) as the read-only view (world, step, ...)."""
-    out = np.moveaxis(values, 1, 0)
-    out.flags.writeable = False
-    return out
-
-
-def _loop(
-    batch: Batch,
-    control: Control,
-    controller: WrenchController,
-    truth: RigidBody,
-    where: dict[str, slice],
-    steps: int,
-    progress: Callable[[int, int], None] | None,
-) -> _Log:
-    """Step all worlds to the end."""
-    worlds, belief = batch.nsim, controller.belief
-    sensordata, xfrc = batch.bind("sensordata"), batch.bind("xfrc_applied")[:, truth.index]
-    stage = int(mujoco.mjtStage.mjSTAGE_VEL)
-    batch.forward(stage=stage)
-    states = States(*(sensordata[:, where[key]] for key in ("position", "quaternion", "velocity", "angular_velocity")))
-    nw, n = belief.wrench_map.shape[0], belief.Q_f.shape[0]
-    log = _Log(
-        sensors=np.empty((steps + 1, *sensordata.shape)),
-        wrench=np.empty((steps, worlds, nw)),
-        wrench_world=np.empty((steps, worlds, 6)),
-        force=np.empty((steps, worlds, n)),
-        residual=np.empty((steps, worlds)),
-        status=np.empty((steps, worlds), np.int8),
-        control_ns=np.empty(steps),
-        wall_s=0.0,
-    )
-    sensors, wrench, wrench_world, force, residual, status, spent, _ = log
-    control.prepare(states, Answers(wrench[0], force[0], residual[0], status[0]))  # compiled before it is timed
-    world_wrench(belief.wrench_map, states.orientation, wrench[0], wrench_world[0])
-    sensors[0] = sensordata
-    report = max(1, steps // 100)
-    start = perf_counter()
-    for k in range(steps):
-        tick = perf_counter_ns()
-        before = wrench[k - 1] if k else None
-        control(k, states, before, Answers(wrench[k], force[k], residual[k], status[k]))
-        spent[k] = perf_counter_ns() - tick
-        world_wrench(belief.wrench_map, states.orientation, wrench[k], wrench_world[k])
-        xfrc[:] = wrench_world[k]
-        batch.step(stage=stage)
-        sensors[k + 1] = sensordata
-        if progress is not None and (k + 1) % report == 0:
-            progress(k + 1, steps)
-    return log._replace(wall_s=perf_counter() - start)

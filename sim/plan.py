@@ -1,18 +1,26 @@
 """Where a scenario's object stands and about what it turns: contacts, axis, and the orientation at angle 0."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product
-from pivoting.models.candidates import Stance, planar_stance, stance, support_points
-from pivoting.models.reading import ModelError, RigidBody, matrix, quaternion, read_body
+from pivoting.models.candidates import planar_stance, stance
+from pivoting.models.frames import matrix, quaternion
+from pivoting.models.given import NEAR
+from pivoting.models.grip import holds
+from pivoting.models.naming import ModelError, label
+from pivoting.models.reading import RigidBody, file_frame, initial_data, read_body
+from pivoting.models.tilt import Arc
 from pivoting.sim.keys import LOWEST
+from pivoting.sim.relative import Load, load
 from pivoting.sim.scenario import Scenario
 
 Array = NDArray[np.float64]
+ANY = Load(1e-6, 1.0, 1e-6)  # so small that nothing that is relative to it is too large
+SAMPLES = 2001  # of a motion, to see how far it goes
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,26 +47,66 @@ class Plan:
     range: tuple[float, float]
     face: Array
 
+    @property
+    def load(self) -> Load:
+        """What values of the scenario may be relative to."""
+        points = np.array([self.body.point(contact) for contact in self.contacts])
+        return load(self.body.mass, self.body.gravity, points, self.radius)
+
 
 def planned(case: Scenario, model: mujoco.MjModel) -> Plan:
-    """The scenario's plan on its compiled model.
+    """The scenario's plan on its compiled model, as the controller believes it.
 
     Raises:
         ModelError: the model cannot be served, or the object cannot be pivoted on that contact; with the reason.
     """
     body = read_body(model, case.body, case.support)
-    table = matrix(body.table)
-    gap = np.deg2rad(LOWEST)
-    if body.dim == 2:
-        return _planar(case, model, body)
-    data = mujoco.MjData(model)
-    if model.nkey:
-        mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_kinematics(model, data)
+    found = _planar(case, model, body) if body.dim == 2 else _spatial(case, model, body)
+    over = float(body.surface.beyond(found.at).max())
+    if over > NEAR * float(np.linalg.norm(found.contacts[0] - body.com)):
+        told = f"the contact would be {over:.3g} m beside its upper face"
+        raise ModelError(f"support = {label(model, body.support)}: {told}; must be under the body")
+    return found
+
+
+def transplanted(plan: Plan, model: mujoco.MjModel, body: RigidBody, grown: float) -> Plan:
+    """A plan in a world that is not as believed: the same contacts, of an object that may be larger, on a table that
+    may be inclined otherwise.
+
+    Args:
+        plan: as believed.  model, body: the world.
+        grown: how many times as large the object is there.
+    """
+    turned = matrix(body.table) @ matrix(plan.body.table).T
+    middle = model.geom_pos[model.body_geomadr[body.index]]  # of the one box that a size may change
+    return replace(
+        plan,
+        body=body,
+        contacts=middle + grown * (plan.contacts - middle) if grown != 1.0 else plan.contacts,
+        face=middle + grown * (plan.face - middle) if grown != 1.0 else plan.face,
+        at=body.origin + turned @ (plan.at - plan.body.origin),
+        axis=turned @ plan.axis,
+        start=quaternion(turned @ matrix(plan.start)),
+    )
+
+
+def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
+    """In space the contacts are found on the object, as `models.candidates.stance` does."""
+    table, gap = matrix(body.table), np.deg2rad(LOWEST)
+    data = initial_data(model)
     now = data.xmat[body.index].reshape(3, 3)
-    found = stance(model, body.index, case.contact, quaternion(now), body.table)
-    if not isinstance(case.contact, str):
-        _refuse_above(model, body, found, table.T @ now)
+    origin, axes = file_frame(model, body.index)
+    contact = case.contact if isinstance(case.contact, str) else _in_body_frame(case.contact, (origin, axes))
+    found = stance(
+        model,
+        body.index,
+        contact,
+        quaternion(now),
+        body.table,
+        arc=None if case.about == "yaw" else _arc(case),
+        holds=holds(model, body),
+        shown=lambda points: (points - origin) @ axes,
+    )
     start, axis = table @ found.rotation, table @ found.axis
     low, high = found.range
     lands = case.limits.contacts_end > 0
@@ -69,25 +117,39 @@ def planned(case: Scenario, model: mujoco.MjModel) -> Plan:
     # the object starts where its file has it: the first contact is put under the place that it has there
     there = data.xpos[body.index] + now @ found.points[0] - body.origin
     at = body.origin + there - (there @ table[:, 2]) * table[:, 2]
-    face = support_points(model, body.index, -found.rotation[2])
-    return Plan(body, found.points, found.radius, at, axis, quaternion(start), limits, face)
+    return Plan(body, found.points, found.radius, at, axis, quaternion(start), limits, found.face)
+
+
+def _arc(case: Scenario) -> Arc | None:
+    """The angles of the scenario's motion, first that at which it begins; None if it gives no angles.
+
+    How long it takes may be relative to where it turns, which is not yet known: that changes no angle.
+    """
+    if not isinstance(case.reference, str) and isinstance(case.seconds, str):
+        return None
+    case = case.absolute(ANY)
+    time = np.linspace(0.0, case.duration, SAMPLES)
+    angle = np.array(case.motion(time)[0], dtype=float)
+    if angle.shape != time.shape or not np.isfinite(angle).all():
+        return None
+    low, high = float(angle.min()), float(angle.max())
+    ends = (low, high) if angle[0] - low <= high - angle[0] else (high, low)
+    return Arc(*ends, np.deg2rad(LOWEST), case.limits.contacts_end > 0)
+
+
+def _in_body_frame(points: ArrayLike, frame: tuple[Array, Array]) -> ArrayLike:
+    """Points (..., 3) that are given in the frame that the file gives the body; anything else as it is."""
+    given = np.asarray(points)
+    if given.dtype.kind not in "iuf" or given.shape[-1:] != (3,):
+        return points
+    origin, axes = frame
+    return origin + given @ axes.T
 
 
 def _planar(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
     """In the plane the contact is the left end of the face that is down at theta = 0, unless it is given."""
     axes, table, gap = matrix(body.axes), matrix(body.table), np.deg2rad(LOWEST)
-    point, radius, most = planar_stance(model, body.index, case.contact, axes)
+    point, radius, most = planar_stance(model, body.index, case.contact, axes, arc=_arc(case))
     face = point - radius * axes[:, 2]
     limits = (gap, most - gap)
     return Plan(body, point[None], np.array([radius]), body.origin, -table[:, 1], body.table, limits, face[None])
-
-
-def _refuse_above(model: mujoco.MjModel, body: RigidBody, found: Stance, now: Array) -> None:
-    """Points that are given have to be the lowest of the body as its file has it, body to table axes `now` (3, 3)."""
-    lowest = support_points(model, body.index, -now[2])[0] @ now[2]
-    height = (found.points @ now[2] - found.radius).max() - lowest
-    if height > 1e-3 * (np.linalg.norm(found.points - body.com, axis=-1) + found.radius).max():
-        raise ModelError(
-            f"contact = {found.points.tolist()}: as the file has the body, this is {height:.3g} m above the table that "
-            'its lowest point could stand on; must be among its lowest, or "vertex", "edge", "lowest"'
-        )

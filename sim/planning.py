@@ -10,7 +10,7 @@ from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product
 from pivoting.controller.validate import fail
 from pivoting.models.candidates import contact_points
-from pivoting.models.reading import matrix
+from pivoting.models.frames import matrix
 from pivoting.sim.attach import Attached
 from pivoting.sim.control import HorizonControl, PlayControl
 from pivoting.sim.plan import Plan
@@ -32,19 +32,20 @@ def horizon_control(
     assert case.plan_hz is not None
     every = round(1.0 / (case.plan_hz * dt))
     whole = abs(every * dt * case.plan_hz - 1.0) < 1e-6
-    if not whole or every < 1 or every * dt > case.plan_steps * case.plan_step:
-        longest = f"{case.plan_steps * case.plan_step:g} s"
+    horizon = scenario_horizon(case, attached, plan)
+    if not whole or every < 1 or every * dt > horizon.steps * horizon.h:
+        longest = f"{horizon.steps * horizon.h:g} s"
         allowed = f"such that a plan is made every {dt:g} s (the time step) to {longest}, in whole time steps"
         raise fail("plan_hz", case.plan_hz, allowed)
-    horizon = scenario_horizon(case, attached, plan)
     horizons = [RecedingHorizon(Planner(horizon), every * dt) for _ in range(worlds)]
     return HorizonControl(horizons, attached.controller, reference, dt, every, steps)
 
 
 def play_control(case: Scenario, attached: Attached, plan: Plan, reference: Turn, dt: float, steps: int) -> PlayControl:
     """The scenario's whole motion as one plan that is played; see `horizon_control`."""
-    per = round(case.plan_step / dt)
-    if per < 1 or abs(per * dt - case.plan_step) > 1e-9:
+    step = float(case.plan_step)
+    per = round(step / dt)
+    if per < 1 or abs(per * dt - step) > 1e-9:
         raise fail("plan_step", case.plan_step, f"a whole number of time steps of {dt:g} s, in open loop")
     if per > 1 and (case.force_rate is not None or case.moment_rate is not None):
         allowed = f"the time step, {dt:g} s, with a bound on a rate: between two steps of a plan its wrench jumps"
@@ -59,7 +60,7 @@ def scenario_horizon(case: Scenario, attached: Attached, plan: Plan, steps: int 
     return Horizon(
         controller,
         int(case.plan_steps) if steps is None else steps,
-        case.plan_step,
+        float(case.plan_step),
         integrator=case.integrator,
         Q=case.track * np.diag((controller.units.force / controller.units.pose) ** 2),
         bounds=case.bounds(),

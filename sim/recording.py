@@ -8,6 +8,7 @@ Nothing is recorded while the loop runs: `record` reads the arrays of a `Run` an
     /world/contact/{predicted,measured}   contact forces f at the contact point, table axes
     /world/contact/cone/{planned,world}   (1 - margin) mu with the floor f_min, and the mu of the world
     /wrench_space/...                     the notes' second figure, object axes; of a planar run
+    /wrench_space/lacking/<status>        from w + J f to what was required, where that is not the same
     /plots/<plot>/<series>                those of `_series`
     /plots/solve_us                       the only entity that holds wall-clock time
     /report                               verdict and checks
@@ -23,13 +24,17 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from pivoting.controller.solution_space import SolutionSpace, solution_space
+from pivoting.controller.solution import STATUS
+from pivoting.controller.solution_space import SolutionSpace
 from pivoting.controller.validate import fail
-from pivoting.sim.film import DEPTH, PLOTS, SCENE, UP, Array, Colour, Film, Rows, usual, xyzw
+from pivoting.sim.control import BOUNDED, FAILED, INACCURATE
+from pivoting.sim.film import PLOTS, SCENE, UP, Array, Colour, Film, Rows, usual, xyzw
+from pivoting.sim.identity import digest
 from pivoting.sim.monitor import predicted_slip
 from pivoting.sim.run import Run
 from pivoting.sim.solids import arcs, cone
 
+OFF = ("off", "false", "0")  # of RERUN, as rerun reads it
 QUAD = [[0, 1, 2], [0, 2, 3]]  # triangles of four corners
 EYE = {2: (0.0, 2.05, 0.25), 3: (0.95, 1.25, 0.55)}  # from the centre to the right, towards us and up [sides]
 FINE, WIDE = 1.5, 4.0  # line widths: what was measured shows under what was predicted
@@ -39,6 +44,12 @@ ORANGE, YELLOW = (255, 150, 40), (250, 215, 90)  # predicted contact force: all 
 RED, PINK = (225, 60, 70), (250, 150, 170)  # measured, likewise
 PURPLE, GREY, WHITE = (165, 130, 235), (170, 170, 170), (235, 235, 235)  # planned cone; the world's, weight; the rest
 BLOCK, EDGES, TABLE, DARK = (70, 105, 145), (150, 185, 225), (120, 112, 100), (24, 26, 30)
+CROWDED = 2  # contacts: the legend of more would cover their plots
+LACKING = {  # status of an answer that does not give what is required -> what is said of that
+    BOUNDED: "bounded: lacking",
+    INACCURATE: "inaccurate: lacking",
+    FAILED: "no answer, nothing applied: lacking",
+}
 TITLES = {  # plot -> title, where the legend is
     "angle": ("angle [deg]", "LeftTop"),
     "slip": ("contact slip [mm]", "LeftTop"),
@@ -56,25 +67,35 @@ COMPONENTS = {  # of w by dimension
 }
 
 
-def record(run: Run, path: Path, *, world: int = 0) -> Path:
+class RecordingOffError(RuntimeError):
+    """The environment says that nothing is to be recorded."""
+
+
+def record(run: Run, path: str | os.PathLike[str], *, world: int | None = None) -> Path:
     """Write one world of a finished run to `path` (.rrd) and return it; `rerun PATH` shows it.
 
-    Views hold 200 Hz of simulated time at most, and 2,000 frames at most; the wrench space 50 Hz and 500, solved again
-    for the occasion; plots every step up to 20,000 rows, and then every second, third... The last is always kept.
+    All of it is what happened: nothing is solved again. Views hold 200 Hz of simulated time at most, and 2,000 frames
+    at most; the wrench space 50 Hz and 500; plots every step up to 20,000 rows, and then every second, third... The
+    last is always kept.
     A world that diverges is recorded up to there. Equal runs give files that `rerun rrd compare --unordered` calls
     equal, but for /plots/solve_us.
 
     Args:
         run: of `simulate`.
         path: of the file, in a folder that exists. It appears, or is replaced, when it is whole.
-        world: which one.
+        world: which one; None: the worst, see `Run.worst_world`.
 
     Raises:
         ValueError: there is no such world.
+        RecordingOffError: RERUN=off is set in the environment.
         OSError: the file cannot be written.
     """
+    path = Path(path)
+    world = run.worst_world if world is None else world
     if isinstance(world, bool) or not isinstance(world, int | np.integer) or not 0 <= world < run.worlds:
         raise fail("world", world, f"a whole number in [0, {run.worlds})")
+    if os.environ.get("RERUN", "").lower() in OFF:
+        raise RecordingOffError(f"RERUN={os.environ['RERUN']} is set in the environment")
     import rerun as rr  # takes a second
 
     partial = path.with_name(f".{path.name}.{os.getpid()}.part")
@@ -92,7 +113,8 @@ def record(run: Run, path: Path, *, world: int = 0) -> Path:
 @np.errstate(over="ignore", invalid="ignore")  # of what diverges: `Film.send` leaves it out
 def _encoded(run: Run, world: int, rr: Any) -> bytes:
     """The file, made in memory: rerun's own file sink can hang on a full disk."""
-    name = f"{run.scenario.label} seed={run.seed} world={world}"  # fixed, without properties: files can be compared
+    # fixed, without properties: files can be compared
+    name = f"{run.scenario.label} seed={run.seed} world={world} {digest(run)}"
     stream = rr.RecordingStream("pivoting", recording_id=name, send_properties=False)
     memory = stream.memory_recording()
     film = Film(run, world, rr, stream)
@@ -120,14 +142,15 @@ def _solids(film: Film) -> None:
     pose = rr.Transform3D(translation=run.truth.origin, quaternion=xyzw(run.truth.table))
     top = rr.Boxes3D(centers=[at - slab * UP], half_sizes=[slab], colors=[TABLE], fill_mode="solid")
     film.still("world/table", pose, top)
-    if film.dim == 2:
-        half = np.abs(run.points[0]) + 0.5 * DEPTH * side * np.array([0.0, 1.0, 0.0])
+    vertices, normals, lines = (np.concatenate(parts) for parts in zip(*film.solids, strict=True))
+    if film.block:
+        half = np.array([1.0, 0.0, 1.0]) * np.abs(vertices).max(axis=0) + [0.0, film.depth, 0.0]
         film.still("world/block/solid", rr.Boxes3D(half_sizes=[half], colors=[BLOCK], fill_mode="solid"))
         film.still("world/block/edges", rr.Boxes3D(half_sizes=[half], colors=[EDGES], radii=thin))
     else:
-        vertices, normals, lines = (np.concatenate(parts) for parts in zip(*film.solids, strict=True))
-        glass = rr.Mesh3D(vertex_positions=vertices, vertex_normals=normals, albedo_factor=(*BLOCK, 60))
-        film.still("world/block/solid", glass)
+        colour = BLOCK if film.dim == 2 else (*BLOCK, 60)
+        solid = rr.Mesh3D(vertex_positions=vertices, vertex_normals=normals, albedo_factor=colour)
+        film.still("world/block/solid", solid)
         film.still("world/block/edges", rr.LineStrips3D(lines, colors=[EDGES], radii=thin))
     rows = film.rows(film.states, SCENE)
     position, quaternion = run.position[film.world, rows], run.quaternion[film.world, rows]
@@ -177,7 +200,7 @@ def _contacts(film: Film) -> None:
     for i, (tag, contact) in enumerate(zip(film.tags, run.attached.controller.contacts, strict=True)):
         entity = f"world/contact/{tag}".rstrip("/")
         film.send(entity, rows, rr.Transform3D, translation=film.corner[rows, i] + film.front, quaternion=pose)
-        measured, predicted = (film.scale * lift(f[film.world, rows, i]) for f in (run.force_measured, run.force))
+        measured, predicted = (film.scale * lift(f[rows, i]) for f in (run.force_measured[film.world], film.force))
         film.arrows(f"{entity}/measured", rows, measured, RED, 2.0 * thick, "")
         film.arrows(f"{entity}/predicted", rows, predicted, ORANGE, thick, f"f {tag}".strip(), at=1.0 if plane else 1.2)
         film.still(f"{entity}/predicted", rr.Arrows3D.from_fields(origins=[[0.0, -8.0 / 3.0 * thick, 0.0]]))
@@ -196,33 +219,39 @@ def _contacts(film: Film) -> None:
 
 
 def _wrench_space(film: Film) -> None:
-    """The notes' second figure over time: contact cone {J f}, admissible w, and the optimum, w + J f = required.
+    """The notes' second figure over time: contact cone {J f}, admissible w, and the w that was applied.
 
+    w + J f = required; where the bounds did not allow it, or there was no answer, an arrow says what is lacking.
     Moments are drawn as M / length, with the length [m] that makes Q_w weigh all axes of the picture alike.
     """
-    if film.dim == 3 or not film.solutions:
+    if film.dim == 3 or not film.answers:
         return
-    rr, rows, size = film.rr, np.array(list(film.solutions)), film.reach
+    rr, run, rows, size = film.rr, film.run, film.space_rows, film.reach
     length, thin, axes = film.length, rr.Radius.ui_points(1.0), 0.8 * size * np.eye(3)
     film.still("wrench_space", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     film.still("wrench_space/axes", rr.Arrows3D(vectors=2.0 * axes, origins=-axes, colors=[GREY], radii=0.006 * size))
     for name, unit, axis in zip(("F_u", "F_v", "M"), ("", "", f" / {length:.3g} m"), axes, strict=True):
         film.still(f"wrench_space/axes/{name}", film.label(f"{name}{unit} [N]", WHITE, 1.1 * axis))
-    spaces = [solution_space(solution, size) for solution in film.solutions.values()]
-    over_time = SolutionSpace(*(np.array(parts) / [1.0, 1.0, length] for parts in zip(*spaces, strict=True)))
-    for name, polygon, colour in (("cone", over_time.cone, ORANGE), ("admissible", over_time.admissible, GREEN)):
+    space = SolutionSpace(*(part / [1.0, 1.0, length] for part in film.space))
+    for name, polygon, colour in (("cone", space.cone, ORANGE), ("admissible", space.admissible, GREEN)):
         fill, edge = f"wrench_space/{name}/fill", f"wrench_space/{name}/edge"
         film.still(fill, rr.Mesh3D.from_fields(triangle_indices=QUAD, albedo_factor=(*colour, 90)))
         film.send(fill, rows, rr.Mesh3D, each=polygon.shape[1], vertex_positions=polygon.reshape(-1, 3))
         film.still(edge, rr.LineStrips3D.from_fields(colors=[colour], radii=[thin]), film.label(name, colour))
         film.send(edge, rows, rr.LineStrips3D, strips=polygon[:, [0, 1, 2, 3, 0]])
         film.send(edge, rows, rr.Points3D, positions=polygon[:, 1:3].mean(axis=1))
-    film.arrows("wrench_space/required", rows, over_time.required, WHITE, 0.02 * size, "required")
-    film.arrows("wrench_space/wrench", rows, over_time.wrench, GREEN, 0.02 * size, "w")
-    film.arrows("wrench_space/contact", rows, over_time.contact, ORANGE, 0.02 * size, "J f", at=0.5)
-    sides = np.stack([over_time.wrench, over_time.required, over_time.contact], axis=1)
+    film.arrows("wrench_space/required", rows, space.required, WHITE, 0.02 * size, "required")
+    film.arrows("wrench_space/wrench", rows, space.wrench, GREEN, 0.02 * size, "w")
+    film.arrows("wrench_space/contact", rows, space.contact, ORANGE, 0.02 * size, "J f", at=0.5)
+    made = space.wrench + np.nan_to_num(space.contact)
     film.still("wrench_space/sum", rr.LineStrips3D.from_fields(colors=[GREY], radii=[thin]))
-    film.send("wrench_space/sum", rows, rr.LineStrips3D, strips=sides)
+    film.send("wrench_space/sum", rows, rr.LineStrips3D, strips=np.stack([space.wrench, made, space.contact], axis=1))
+    for code, label in LACKING.items():
+        short = (run.status[film.world, rows] == code)[:, None]
+        if short.any():
+            lacking = np.where(short, space.required - made, np.nan)
+            name = f"wrench_space/lacking/{STATUS[code]}"
+            film.arrows(name, rows, lacking, RED, 0.02 * size, label, at=0.5, origins=made)
 
 
 def _series(film: Film) -> dict[str, tuple[Colour, float, Array]]:
@@ -232,7 +261,7 @@ def _series(film: Film) -> dict[str, tuple[Colour, float, Array]]:
     """
     run, i, n, N, plane = film.run, film.world, film.states, film.answers, film.dim == 2
     slips = 1e3 * run.slip[i, :n], 1e3 * predicted_slip(run)[i, :n]
-    forces = run.force_measured[i, :N], run.force[i, :N]
+    forces = run.force_measured[i, :N], film.force[:N]
 
     def along(vectors: Array) -> Array:
         return vectors[:, 0] if plane else np.linalg.norm(vectors, axis=1)
@@ -280,6 +309,8 @@ def _report(film: Film) -> str:
     lines += ["", f"Green: applied w. Orange: contact force f predicted, red: measured. {1e3 * film.scale:.3g} mm / N."]
     if film.dim == 3:
         lines += [f"Teal: its moment, {1e3 * film.scale / film.length:.3g} mm / (N m)."]
+    if len(film.tags) > 1:
+        lines += ["Of several contacts the first has the brightest lines; thick: measured, thin: predicted or planned."]
     return "\n".join(lines)
 
 
@@ -292,10 +323,13 @@ def _blueprint(film: Film, plots: list[str]) -> Any:
         return rrb.Spatial3DView(origin=origin, name=name, eye_controls=eyes, background=DARK, line_grid=False)
 
     eye = film.centre + film.side * np.array(EYE[film.dim]) @ np.array([np.cross(film.away, UP), -film.away, UP])
-    lines = [
-        rrb.TimeSeriesView(origin=f"plots/{name}", name=TITLES[name][0], plot_legend=rrb.PlotLegend(TITLES[name][1]))
-        for name in plots
-    ]
+    lines = []
+    for name in plots:
+        title, corner = TITLES[name]
+        if name == "slip" and film.dim == 3:
+            title = "size of the contact slip [mm]"
+        legend = rrb.PlotLegend(corner, visible=len(film.tags) <= CROWDED)
+        lines.append(rrb.TimeSeriesView(origin=f"plots/{name}", name=title, plot_legend=legend))
     if film.dim == 2:
         around, middle = film.reach * np.array([[0.35, 1.9, 1.2], [0.15, 0.15, 0.0]])
         second = view("wrench_space", "wrench space, object axes", around, middle)

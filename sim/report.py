@@ -1,16 +1,23 @@
 """What people read: tables of a run, of the scenarios and of the worked example."""
 
+from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 from pivoting.controller.example import EXAMPLES, Digit
 from pivoting.controller.solution import Solution
+from pivoting.sim.keys import GROUPS, KEYS
 from pivoting.sim.run import Run
-from pivoting.sim.scenario import SCENARIOS
+from pivoting.sim.scenario import Scenario
+from pivoting.sim.shipped import SCENARIOS
+from pivoting.sim.verdict import Limits
 from rich.console import Console
 from rich.table import Table
 
-_EVENTS = 5  # that people are shown
+_EVENTS, _FAILED = 5, 10  # events and failed worlds that people are shown
+_READ = {"object": "read of the object", "contact_settings": "contact"}  # what was read, in the summary and in words
+_UNITS = {"kg_m2": "kg m^2", "kg": "kg", "m": "m", "s": "s"}  # with which a name in the summary may end
 
 # name in the summary: (what people read, factor, unit)
 _LINES = {
@@ -18,6 +25,8 @@ _LINES = {
     "angle_error_rms_deg": ("angle error, RMS", 1.0, "deg"),
     "angle_error_max_deg": ("angle error, greatest", 1.0, "deg"),
     "contact_lost_s": ("time without contact", 1.0, "s"),
+    "undeclared_contact_s": ("time with an undeclared contact", 1.0, "s"),
+    "penetration_rel": ("depth that the contact does not explain", 100.0, "% of the lever"),
     "friction_use_max": ("friction used, |f_t| / (mu f_n)", 1.0, ""),
     "force_mismatch_rel": ("contact force, predicted against measured", 100.0, "%"),
     "contacts_missing": ("contacts missing at the end", 1.0, ""),
@@ -30,6 +39,13 @@ def print_run(console: Console, run: Run) -> None:
     """The verdict table of a run."""
     summary = run.summary()
     console.print(f"[bold]{run.scenario.label}[/]: {run.scenario.summary}", soft_wrap=True, highlight=False)
+    resolved = [
+        f"{key} = {getattr(run.scenario, key)}: {value:.4g} {KEYS[key].unit}"
+        for key, value in summary["resolved"].items()
+    ]
+    read = [f"{name}: {_words(summary[key])}" for key, name in _READ.items() if summary.get(key)]
+    for line in [", ".join(resolved)] * bool(resolved) + read:
+        console.print(line, highlight=False, markup=False, soft_wrap=True, style="dim")
     table = Table()
     for heading in ("measured in MuJoCo" + (", worst world" if run.worlds > 1 else ""), "value", "limit", ""):
         table.add_column(heading, justify="right" if heading in ("value", "limit") else "left")
@@ -42,8 +58,9 @@ def print_run(console: Console, run: Run) -> None:
             "[green]pass[/]" if check.passed else "[red]FAIL[/]",
         )
         if check.name == "slip_max_m":
-            floor = 1e3 * summary["slip_floor_m"]
-            table.add_row("  of which the simulator's own, predicted", f"{_short(floor)} mm", "", "", style="dim")
+            floor, unknown = 1e3 * summary["slip_floor_m"], summary["slip_floor_unknown"]
+            told = f"unknown: {unknown}" if unknown else f"{_short(floor)} mm"
+            table.add_row("  of which the simulator's own, predicted", told, "", "", style="dim")
     console.print(table)
     failed = run.failed_worlds.size
     console.print(
@@ -51,6 +68,13 @@ def print_run(console: Console, run: Run) -> None:
         f"   worlds: {run.worlds - failed} of {run.worlds} within limits"
         f"   greatest KKT residual: {summary['residual_max']:.1e}"
     )
+    if run.worlds > 1:
+        some = ", ".join(str(i) for i in run.failed_worlds[:_FAILED]) + f" and {failed - _FAILED} more" * (
+            failed > _FAILED
+        )
+        console.print(
+            f"the worst world is {run.worst_world}" + f"; those that fail are {some}" * bool(failed), highlight=False
+        )
     console.print(
         f"{summary['sim_s']:g} s simulated in {summary['wall_s']:.2f} s; stating, solving and certifying the problem:"
         f" {summary['solve_us_median']:.1f} us a step (99th percentile {summary['solve_us_p99']:.1f})",
@@ -75,10 +99,53 @@ def print_run(console: Console, run: Run) -> None:
         console.print(told, style="yellow", soft_wrap=True)
     for warning in run.engine_warnings:
         console.print(f"MuJoCo: {warning}", style="yellow", highlight=False, soft_wrap=True)
+    for reason in summary["reasons"]:
+        console.print(f"why: {reason}", style="yellow", soft_wrap=True, highlight=False)
     for event in run.events[:_EVENTS]:
         console.print(f"world {event.world}, {event.time:.3f} s: {event.what}", style="yellow", soft_wrap=True)
     if len(run.events) > _EVENTS:
         console.print(f"and {len(run.events) - _EVENTS} more events, all in summary.json", style="yellow")
+
+
+def key_help() -> list[tuple[str, list[tuple[str, str]]]]:
+    """The keys of `--set` by whose they are, each with what it means and may be and its default; those of `--limit`."""
+    defaults = {each.name: each.default for each in fields(Scenario)}
+    out = []
+    for group in GROUPS:
+        rows = []
+        for name, key in KEYS.items():
+            if key.of == group:
+                default = key.optional if defaults[name] is None else _plain(defaults[name])
+                rows.append((name, f"{key.help} [{key.allowed}; default: {default}]"))
+        out.append((f"Keys of --set, {group}", rows))
+    limits = [(name, f"[>= 0; default: {_plain(value)}]") for name, value in vars(Limits()).items()]
+    return [*out, ("Keys of --limit, what the verdict allows, with the unit in the name", limits)]
+
+
+def _words(read: Mapping[str, Any]) -> str:
+    """A mapping of the summary as people read it: names, numbers, units; what is empty or zero is left out."""
+    said = []
+    for key, value in read.items():
+        unit = next((unit for unit in _UNITS if key.endswith(f"_{unit}")), "")
+        name = key.removesuffix(f"_{unit}").replace("_", " ")
+        if isinstance(value, Mapping):
+            said.append(f"{name} ({_words(value)})" if value else "")
+        elif isinstance(value, str) or np.any(value):
+            said.append(f"{name} {_shown(value)} {_UNITS.get(unit, '')}".strip())
+    return ", ".join(filter(None, said))
+
+
+def _shown(value: Any) -> str:
+    if not isinstance(value, list | tuple):
+        return _plain(value)
+    table = np.array(value, dtype=float) if not any(isinstance(item, str) for item in value) else np.empty(0)
+    if table.ndim == 2 and table.shape == (3, 3) and not (table - np.diag(np.diag(table))).any():
+        return f"diag{_shown(np.diag(table).tolist())}"
+    return "(" + ", ".join(_shown(item) for item in value) + ")"
+
+
+def _plain(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def print_scenarios(console: Console) -> None:

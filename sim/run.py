@@ -10,21 +10,38 @@ from numpy.typing import NDArray
 from pivoting.controller.plan import Plan
 from pivoting.controller.so3 import rotated
 from pivoting.controller.space import CONJUGATE, Space, quaternion_product, space
-from pivoting.models.reading import RigidBody, matrix
+from pivoting.controller.units import lever
+from pivoting.models.contact_settings import ContactSettings
+from pivoting.models.frames import matrix
+from pivoting.models.naming import label
+from pivoting.models.reading import RigidBody
+from pivoting.sim.advice import reasons, remedies
 from pivoting.sim.attach import Attached
+from pivoting.sim.contact_readings import ContactReadings, Declared
 from pivoting.sim.control import BOUNDED, Event, PlanLog, plan_figures
-from pivoting.sim.fidelity import ContactRows
-from pivoting.sim.monitor import Measures, measure
+from pivoting.sim.fidelity import ContactRows, Held, stepped_point
+from pivoting.sim.monitor import Measures, measure, slip_floor_unknown
+from pivoting.sim.relative import Load
 from pivoting.sim.scenario import Scenario
-from pivoting.sim.verdict import Check, judge
+from pivoting.sim.strays import stray_words
+from pivoting.sim.verdict import Check, Limits, judge, worst_world
 
 Array = NDArray[np.float64]
+_CHOSEN = ("contacts", "coupling", "reason")  # of the contact settings, what the model itself does not say
 
 
-def _frozen(values: Array) -> Array:
+def frozen(values: Array) -> Array:
     """What is measured cannot be changed before it is judged."""
     values.flags.writeable = False
     return values
+
+
+def _freeze(values: Any) -> None:
+    if isinstance(values, np.ndarray):
+        values.flags.writeable = False
+    elif isinstance(values, tuple):
+        for value in values:
+            _freeze(value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,25 +52,29 @@ class Run:
         scenario: what was run, overrides included.
         seed: of the worlds' initial errors.
         attached: the controller and what it believes.
+        load: what the scenario's relative values are relative to.
         model: the world's, with the sensors of the loop.  truth: the body as that has it.
-        points: (K, 3) the world's contact points, or centres of what rolls, from the CoM, object axes [m].
+        replaced: what of the file gave way to the settings of the shipped scenes: name, and what it was.
+        settings: contact parameters that were chosen for the object, if they were.
+        declared: the contacts that are to stick, as the world has them.
         radius: (K,) of what rolls, else 0 [m].
         face: (P, 3) likewise, the corners of the face that the object lies on at angle 0.
         turn: the axis (3,) [world axes] and the orientation (4,) at angle 0 that `theta` is counted from.
         mu_world: the world's friction.
-        contact_rows: MuJoCo's contact at the start, for the predicted slip.
+        contact_rows: MuJoCo's contacts with the support, for the predicted slip.
         start: qpos (W, nq) and qvel (W, nv) of the worlds at time 0, from which the applied wrenches replay the run.
         time: (N+1,) [s].
         reference: desired angle, rate and acceleration, each (N+1,) [rad, s].
         desired: the same as orientations (N+1, 4), angular velocities and accelerations (N+1, 3), world axes.
         position: (W, N+1, 3) CoM, world axes [m].  quaternion: (W, N+1, 4) object to world.
         velocity, angular_velocity: (W, N+1, 3) of the CoM, world axes [m/s, rad/s].
+        required: (W, N, nw) what the solved problem required, J f + w, object axes [N, N m].
         wrench: (W, N, 3 or 6) object axes, (F_u, F_v, M) in the plane [N, N m]; nan where there was no
             answer, and then none is applied.
         wrench_world: (W, N, 6) applied force and torque at the CoM, world axes.
         force: (W, N, K, d) contact forces (f_t, f_n) or (f_t, f_o, f_n) predicted by the solution, table axes [N].
-        force_measured: (W, N, K, d) by MuJoCo's contact sensors, likewise.
-        contacts_found: (W, N) contacts between the body and its support, as MuJoCo counts them.
+        force_measured: (W, N, K, d) by MuJoCo's contacts, likewise.
+        contacts: what else they say, see `ContactReadings`; held: what their rows do, see `Held`.
         residual: (W, N) relative KKT residuals.
         status: (W, N) codes of `solution.STATUS`; 0 is solved, 3 as far as the bounds allowed.
         control_us: (N,) time to state, solve and certify the problem of one world [microseconds].
@@ -67,9 +88,12 @@ class Run:
     scenario: Scenario
     seed: int
     attached: Attached
+    load: Load
     model: mujoco.MjModel
     truth: RigidBody
-    points: Array
+    replaced: tuple[tuple[str, str], ...]
+    settings: ContactSettings | None
+    declared: Declared
     radius: Array
     face: Array
     turn: tuple[Array, Array]
@@ -83,11 +107,13 @@ class Run:
     quaternion: Array
     velocity: Array
     angular_velocity: Array
+    required: Array
     wrench: Array
     wrench_world: Array
     force: Array
     force_measured: Array
-    contacts_found: Array
+    contacts: ContactReadings
+    held: Held
     residual: Array
     status: NDArray[np.int8]
     control_us: Array
@@ -97,6 +123,26 @@ class Run:
     events: tuple[Event, ...]
     engine_warnings: tuple[str, ...]
     controller: str
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """From pickle, which forgets that arrays are read-only."""
+        vars(self).update(state)
+        _freeze(tuple(state.values()))
+
+    @property
+    def points(self) -> Array:
+        """(K, 3) the contact points, or centres of what rolls, from the CoM, object axes [m]."""
+        return self.declared.points
+
+    @property
+    def contacts_found(self) -> Array:
+        """(W, N) contacts between the body and its support, as MuJoCo counts them."""
+        return self.contacts.found
+
+    @property
+    def size(self) -> float:
+        """Lever from the CoM to the contacts [m], against which lengths are judged."""
+        return lever(self.points) + float(np.mean(self.radius))
 
     @property
     def worlds(self) -> int:
@@ -119,12 +165,12 @@ class Run:
         axis, start = self.turn
         turned = quaternion_product(self.quaternion, start * CONJUGATE)
         half = np.arctan2(turned[..., 1:] @ axis, turned[..., 0])
-        return _frozen(np.arctan2(np.sin(2.0 * half), np.cos(2.0 * half)))
+        return frozen(np.arctan2(np.sin(2.0 * half), np.cos(2.0 * half)))
 
     @cached_property
     def omega(self) -> Array:
         """(W, N+1) rate of turn about the reference's axis [rad/s]."""
-        return _frozen(self.angular_velocity @ self.turn[0])
+        return frozen(self.angular_velocity @ self.turn[0])
 
     @cached_property
     def angle_error(self) -> Array:
@@ -132,7 +178,7 @@ class Run:
         turned = quaternion_product(self.quaternion, self.desired[0] * CONJUGATE)
         turned *= np.where(turned[..., :1] < 0.0, -1.0, 1.0)  # the shorter way round
         size = 2.0 * np.arctan2(np.linalg.norm(turned[..., 1:], axis=-1), turned[..., 0])
-        return _frozen(np.copysign(size, turned[..., 1:] @ self.turn[0]))
+        return frozen(np.copysign(size, turned[..., 1:] @ self.turn[0]))
 
     @cached_property
     def table_axes(self) -> Array:
@@ -142,17 +188,29 @@ class Run:
     @cached_property
     def turning(self) -> Array:
         """(W, N+1, K, 3) from the CoM to the material contact points, or the centres of what rolls, table axes [m]."""
-        return _frozen(self._from_com(self.points))
+        return frozen(self._from_com(self.points))
 
     @cached_property
     def lever(self) -> Array:
         """(W, N+1, K, 3) from the CoM to where the contacts touch, table axes [m]."""
-        return _frozen(self.turning - self._up)
+        return frozen(self.turning - self._up)
+
+    @cached_property
+    def stepped(self) -> Array:
+        """(W, N+1, 3) from the CoM to the point of the body whose velocity MuJoCo steps, table axes [m]."""
+        point = stepped_point(self.model, self.truth.index) - self.truth.com
+        return frozen(self._from_com(point[None] @ matrix(self.truth.axes))[..., 0, :])
+
+    @cached_property
+    def stepped_velocity(self) -> Array:
+        """(W, N+1, 3) of that point, table axes [m/s]."""
+        omega = self.angular_velocity @ self.table_axes
+        return frozen(self.velocity @ self.table_axes + np.cross(omega, self.stepped))
 
     @cached_property
     def corner(self) -> Array:
         """(W, N+1, K, 3) where the contacts touch, from the table's origin, table axes [m]."""
-        return _frozen(self._com[..., None, :] + self.lever)
+        return frozen(self._com[..., None, :] + self.lever)
 
     @cached_property
     def rolled(self) -> Array:
@@ -162,7 +220,7 @@ class Run:
         """
         speed = np.cross((self.angular_velocity @ self.table_axes)[..., None, :], self._up)[..., :2]
         speed[:, 0] = 0.0
-        return _frozen(np.cumsum(speed * self.dt, axis=1))
+        return frozen(np.cumsum(speed * self.dt, axis=1))
 
     @property
     def _up(self) -> Array:
@@ -172,7 +230,7 @@ class Run:
     @cached_property
     def clearance(self) -> Array:
         """(W, N+1) height above the table of the highest corner of the face that the object lies on at angle 0 [m]."""
-        return _frozen((self._com[..., None, :] + self._from_com(self.face))[..., 2].max(axis=-1))
+        return frozen((self._com[..., None, :] + self._from_com(self.face))[..., 2].max(axis=-1))
 
     @property
     def _com(self) -> Array:
@@ -186,7 +244,7 @@ class Run:
     @cached_property
     def slip(self) -> Array:
         """(W, N+1, K, 2) displacement of the contacts along the table (t, o) since the start, less `rolled` [m]."""
-        return _frozen(self.corner[..., :2] - self.corner[:, :1, :, :2] - self.rolled)
+        return frozen(self.corner[..., :2] - self.corner[:, :1, :, :2] - self.rolled)
 
     @cached_property
     def friction_use(self) -> Array:
@@ -194,7 +252,7 @@ class Run:
         tangential = np.linalg.norm(self.force_measured[..., :-1], axis=-1)
         normal = self.force_measured[..., -1]
         pushed = normal > 0.0
-        return _frozen(np.where(pushed, tangential, np.nan) / np.where(pushed, self.mu_world * normal, 1.0))
+        return frozen(np.where(pushed, tangential, np.nan) / np.where(pushed, self.mu_world * normal, 1.0))
 
     @cached_property
     def landed(self) -> NDArray[np.bool_]:
@@ -206,15 +264,30 @@ class Run:
         """What the monitor makes of it, for each world."""
         return measure(self)
 
+    @property
+    def limits(self) -> Limits:
+        """Of the verdict, with that on the slip in metres."""
+        return self.scenario.limits.for_object(self.size, float(np.linalg.norm(self.truth.gravity)))
+
+    @cached_property
+    def strays(self) -> list[str]:
+        """Which geoms met in contacts that are not declared, in words."""
+        return stray_words(self)
+
     @cached_property
     def checks(self) -> tuple[Check, ...]:
         """The verdict, line by line."""
-        return judge(self.measures, self.scenario.limits)
+        return judge(self.measures, self.limits)
 
     @property
     def failed_worlds(self) -> NDArray[np.intp]:
         """Indices of the worlds that fail any check."""
         return np.flatnonzero(np.any([check.failed for check in self.checks], axis=0))
+
+    @cached_property
+    def worst_world(self) -> int:
+        """The one in which a measured value is the greatest multiple of its limit."""
+        return worst_world(self)
 
     @property
     def verdict(self) -> str:
@@ -231,23 +304,62 @@ class Run:
             "contacts": self.points.tolist(),
             "radius": self.radius.tolist(),
             "changes": self.scenario.changes,
-            "limits": asdict(self.scenario.limits),
+            "resolved": self.scenario.resolved(self.load),
+            "limits": asdict(self.limits),
             "controller": self.controller,
             "seed": self.seed,
             "worlds": self.worlds,
             "verdict": self.verdict,
             "failed_worlds": self.failed_worlds.tolist(),
+            "worst_world": self.worst_world,
             **worst,
+            "slip_floor_unknown": slip_floor_unknown(self) or None,
             "solve_us_median": float(np.median(self.control_us)),
             "solve_us_p99": float(np.quantile(self.control_us, 0.99)),
             "sim_s": float(self.time[-1]),
             "wall_s": self.wall_s,
             "real_time_factor": self.worlds * float(self.time[-1]) / self.wall_s,
             "bounded_steps": int(np.count_nonzero(self.status == BOUNDED)),
+            "reasons": reasons(self),
+            "remedies": [remedy.setting for remedy in remedies(self)],
+            "undeclared_contacts": self.strays,
+            "support": label(self.model, self.truth.support).strip("'"),
+            "object": self.object,
+            "contact_settings": self.contact_settings,
             "events": [event._asdict() for event in self.events],
             "engine_warnings": list(self.engine_warnings),
             **({} if self.plans is None else plan_figures(self.plans)),
             **({} if self.plan is None else {"plan_angle_error_max_deg": float(np.rad2deg(self.plan_error.max()))}),
+        }
+
+    @property
+    def object(self) -> dict[str, Any]:
+        """What was read of the object, as the world has it; the contacts in its body frame."""
+        R = matrix(self.truth.axes)
+        return {
+            "support": label(self.model, self.truth.support).strip("'"),
+            "mass_kg": self.truth.mass,
+            "inertia_kg_m2": np.asarray(self.truth.inertia).tolist(),
+            "com_m": self.truth.com.tolist(),
+            "mu": self.mu_world,
+            "contacts_m": (self.truth.com + self.points @ R.T).tolist(),
+            "radius_m": self.radius.tolist(),
+            "damping": 0.0 if self.truth.drag is None else float(self.truth.drag.damping.max()),
+            "frictionloss": 0.0 if self.truth.drag is None else float(self.truth.drag.friction.max()),
+        }
+
+    @property
+    def contact_settings(self) -> dict[str, Any]:
+        """The support's contact parameters in the world, and what they replaced of the file."""
+        opt, geom = self.model.opt, self.truth.support
+        return {
+            "dt_s": float(opt.timestep),
+            "solref": self.model.geom_solref[geom].tolist(),
+            "solimp": self.model.geom_solimp[geom].tolist(),
+            "impratio": float(opt.impratio),
+            "cone": mujoco.mjtCone(int(opt.cone)).name.removeprefix("mjCONE_").lower(),
+            "replaced": dict(self.replaced),
+            **({} if self.settings is None else {key: getattr(self.settings, key) for key in _CHOSEN}),
         }
 
     @cached_property
@@ -264,4 +376,4 @@ class Run:
         kept = times <= self.time[-1] + 1e-9
         steps = np.round(times[kept] / self.dt).astype(int)
         turned = quaternion_product(self.quaternion[:, steps], self.plan.orientation[kept] * CONJUGATE)
-        return _frozen(2.0 * np.arctan2(np.linalg.norm(turned[..., 1:], axis=-1), np.abs(turned[..., 0])))
+        return frozen(2.0 * np.arctan2(np.linalg.norm(turned[..., 1:], axis=-1), np.abs(turned[..., 0])))

@@ -1,7 +1,9 @@
-"""Scenarios: what a closed-loop run is made of, the keys that change it, and the shipped ones."""
+"""Scenarios: what a closed-loop run is made of, and the keys that change it."""
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -9,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 from pivoting.controller.bounds import WrenchBounds
-from pivoting.controller.laws import FORMULATIONS, Law
+from pivoting.controller.laws import Law
 from pivoting.controller.problem import wrench_weight
 from pivoting.controller.references import Constant, MinimumJerk, Reference, Sine
-from pivoting.controller.transcription import INTEGRATORS
 from pivoting.controller.validate import Array, fail, number, one_of
 from pivoting.models.scenes import BODY, TABLE, WORLD_KEYS, scene_path
-from pivoting.sim.keys import BOUND_KEYS, HIDDEN_KEYS, KEYS, LOWEST, OPTIONAL, RANGES, parsed
+from pivoting.sim.keys import BOUND_KEYS, HIDDEN_KEYS, KEYS, LOWEST, RELATIVE_KEYS, check, parsed
+from pivoting.sim.relative import Load, absolute
 from pivoting.sim.verdict import Limits
 
 
@@ -40,7 +42,7 @@ class Scenario:
             and after), "return" (an arc and back), "sine" (theta + amplitude sin, for seconds); from Python also any
             `Reference`, for seconds.
         law: of `controller.laws.FORMULATIONS`.  bandwidth [rad/s] (1/h of a quasi-dynamic law), damping: of the law.
-        margin: share of mu kept unused.  f_min: normal-force floor [N].
+        margin: share of mu kept unused.  f_min: floor of each contact's normal force [N].
         length: characteristic length of Q_w [m]; None: the lever of the contact.
         force_max [N], moment_max [N m], force_rate [N/s], moment_rate [N m/s]: bounds on the wrench, in object axes;
             None: none.
@@ -49,11 +51,16 @@ class Scenario:
         track: what a pose error of one radian, or one lever, costs in a plan's step, in squares of the weight.
         spread: each world starts off the reference by up to this angle [deg], drawn from the seed.
         limits: the thresholds of the verdict.
+        given: what was set with `change`, as the command line spells it.
+
+    Bounds and f_min may be relative to the weight of the object as it is believed, "0.8w", of a moment with the lever
+    from contact to CoM, of a rate per second; and seconds, hold, period and plan_step to its natural time, "3T"; see
+    `relative`. `absolute` resolves them.
     """
 
     name: str
     summary: str
-    scene: str | Path
+    scene: str | os.PathLike[str]
     body: str = BODY
     support: str | None = TABLE
     contact: str | ArrayLike = "corner"
@@ -62,23 +69,23 @@ class Scenario:
     reference: str | Reference = "constant"
     theta: float = 30.0
     theta_end: float = 80.0
-    seconds: float = 10.0
-    hold: float = 0.25
+    seconds: float | str = 10.0
+    hold: float | str = 0.25
     amplitude: float = 5.0
-    period: float = 2.0
+    period: float | str = 2.0
     law: str = "dynamic"
     bandwidth: float = 40.0
     damping: float = 1.0
     margin: float = 1.0 / 6.0
-    f_min: float = 0.0
+    f_min: float | str = 0.0
     length: float | None = None
-    force_max: float | None = None
-    moment_max: float | None = None
-    force_rate: float | None = None
-    moment_rate: float | None = None
+    force_max: float | str | None = None
+    moment_max: float | str | None = None
+    force_rate: float | str | None = None
+    moment_rate: float | str | None = None
     plan_hz: float | None = None
     plan_steps: int = 20
-    plan_step: float = 0.02
+    plan_step: float | str = 0.02
     integrator: str = "semi-implicit"
     track: float = 1e4
     spread: float = 0.01
@@ -93,38 +100,40 @@ class Scenario:
     impratio: float | None = None
     world: Mapping[str, float] = field(default_factory=dict)
     limits: Limits = field(default_factory=Limits)
+    given: frozenset[str] = field(default=frozenset(), compare=False)
 
     def __post_init__(self) -> None:
         if isinstance(self.reference, np.ndarray | list | tuple):
             raise fail("reference", type(self.reference).__name__, "Sampled(samples, dt), which knows their times")
-        if isinstance(self.reference, str) or not callable(self.reference):
-            one_of("reference", self.reference, ("constant", "arc", "return", "sine"))
-        one_of("law", self.law, FORMULATIONS)
-        one_of("integrator", self.integrator, tuple(INTEGRATORS))
-        if not float(self.plan_steps).is_integer():
-            raise fail("plan_steps", self.plan_steps, "a whole number")
         if not isinstance(self.limits, Limits):
             raise fail("limits", self.limits, "Limits")
         one_of("about", self.about, ("tilt", "yaw"))
         corner = isinstance(self.contact, str) and self.contact == "corner"
-        for key in RANGES:
+        for key in KEYS:
+            value = getattr(self, key)
             if key in ("theta", "theta_end") and not corner:  # what an object allows, its plan knows
-                number(key, getattr(self, key), at_least=-360.0, at_most=360.0, unit="deg")
-            elif getattr(self, key) is not None or key not in OPTIONAL:
-                number(key, getattr(self, key), **RANGES[key])
+                check(key, value, at_least=-360.0, at_most=360.0)
+            elif key != "reference" or isinstance(value, str) or not callable(value):
+                check(key, value)
         object.__setattr__(self, "world", MappingProxyType(dict(self.world)))
         for key, value in self.world.items():
             if key not in HIDDEN_KEYS:
                 raise fail(f"world.{key}", value, "one of " + ", ".join(f"world.{k}" for k in HIDDEN_KEYS))
-            number(f"world.{key}", value, **RANGES[key])
+            check(key, value, "world.")
+        if not isinstance(self.scene, str):
+            object.__setattr__(self, "scene", Path(self.scene))
         swing = self.amplitude if self.reference == "sine" else 0.0
         if corner and not LOWEST <= self.theta - swing <= self.theta + swing <= 90.0 - LOWEST:
             raise fail("amplitude", swing, f"such that the block stays on its corner about theta = {self.theta:g} deg")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle, which takes no read-only mapping."""
+        return partial(Scenario, **{**vars(self), "world": dict(self.world)}), ()
+
     @property
     def path(self) -> Path:
         """The MJCF file."""
-        return self.scene if isinstance(self.scene, Path) else scene_path(self.scene)
+        return scene_path(self.scene) if isinstance(self.scene, str) else Path(self.scene)
 
     @property
     def believed(self) -> dict[str, float]:
@@ -138,35 +147,39 @@ class Scenario:
 
     @property
     def motion(self) -> Reference:
-        """The reference, in radians."""
+        """The reference of a scenario that is `absolute`, in radians."""
         if not isinstance(self.reference, str):
             return self.reference
         start, end = np.deg2rad(self.theta), np.deg2rad(self.theta_end)
         if self.reference == "constant":
             return Constant(start)
         if self.reference == "sine":
-            return Sine(start, np.deg2rad(self.amplitude), self.period)
-        return MinimumJerk((start, end, start) if self.reference == "return" else (start, end), self.seconds, self.hold)
+            return Sine(start, np.deg2rad(self.amplitude), self._number("period"))
+        points = (start, end, start) if self.reference == "return" else (start, end)
+        return MinimumJerk(points, self._number("seconds"), self._number("hold"))
 
     @property
     def duration(self) -> float:
         """Simulated time [s]."""
-        motion = self.motion
-        return motion.duration if isinstance(motion, MinimumJerk) and self.reference is not motion else self.seconds
+        ends = isinstance(self.reference, str) and np.isfinite(self.motion.duration)
+        return self.motion.duration if ends else self._number("seconds")
 
     @property
     def changes(self) -> dict[str, Any]:
-        """What differs from the shipped scenario of this name, by key; everything, if there is none."""
-        own_one = isinstance(self.scene, Path) and self.name == "pivot"
-        shipped = own_object(self.scene, self.body) if own_one else SCENARIOS.get(self.name)  # type: ignore[arg-type]
-        own = {
-            key: getattr(self, key) for key in KEYS if shipped is None or getattr(self, key) != getattr(shipped, key)
-        }
-        if "reference" in own and not isinstance(self.reference, str):
-            own["reference"] = type(self.reference).__name__
-        theirs = {} if shipped is None else shipped.world
-        hidden = {f"world.{key}": value for key, value in self.world.items() if theirs.get(key) != value}
-        return {**own, **hidden}
+        """What was set, and what else differs from the shipped scenario of this name, or else from the defaults."""
+        from pivoting.sim.shipped import shipped  # which are made of this
+
+        then = (shipped(self) or Scenario(self.name, self.summary, self.scene))._values
+        return {k: value for k, value in self._values.items() if k in self.given or k not in then or then[k] != value}
+
+    @property
+    def _values(self) -> dict[str, Any]:
+        """By key of the command line; limits of the verdict as limit.KEY."""
+        plain = {key: getattr(self, key) for key in KEYS}
+        if not isinstance(self.reference, str):
+            plain["reference"] = type(self.reference).__name__
+        hidden = {f"world.{key}": value for key, value in self.world.items()}
+        return {**plain, **hidden, **{f"limit.{key}": value for key, value in vars(self.limits).items()}}
 
     @property
     def label(self) -> str:
@@ -181,11 +194,30 @@ class Scenario:
             return Law.quasi_dynamic(1.0 / self.bandwidth, velocity=self.law == "quasi-dynamic-velocity")
         return Law.dynamic(self.bandwidth, self.damping)
 
+    def absolute(self, of: Load) -> "Scenario":
+        """This scenario with all that is relative resolved: it says how it moves a load, and within which bounds.
+
+        Raises:
+            ValueError: there is nothing to be relative to, or what comes out is out of range.
+        """
+        return replace(self, **self.resolved(of))
+
+    def resolved(self, of: Load) -> dict[str, Any]:
+        """What is relative, by key, in the key's own unit."""
+        given = {key: getattr(self, key) for key in RELATIVE_KEYS if isinstance(getattr(self, key), str)}
+        return {
+            key: absolute(key, value, KEYS[key].relative, of, KEYS[key].unit, KEYS[key].limits)
+            for key, value in given.items()
+        }
+
     def bounds(self) -> WrenchBounds:
-        """On the wrench; without any, one that bounds nothing."""
-        names = {"force_max": "force", "moment_max": "moment"}
-        given = {names.get(key, key): getattr(self, key) for key in BOUND_KEYS if getattr(self, key) is not None}
-        return WrenchBounds(**given)
+        """On the wrench, of a scenario that is `absolute`; without any, one that bounds nothing."""
+        given = {key: self._number(key) for key in BOUND_KEYS if getattr(self, key) is not None}
+        return WrenchBounds(**{key.removesuffix("_max"): value for key, value in given.items()})
+
+    def _number(self, key: str) -> float:
+        """A value that is no longer relative."""
+        return number(key, getattr(self, key), unit=KEYS[key].unit)
 
     def wrench_weight(self, dim: int) -> Array | None:
         """Q_w of the characteristic length, or None for the controller's own."""
@@ -194,11 +226,13 @@ class Scenario:
     def change(self, **overrides: Any) -> "Scenario":
         """This scenario with other values; `world.KEY` (or a mapping `world`) changes the world alone.
 
-        A plain key that the world had a value of its own for sets both again.
+        A plain key that the world had a value of its own for sets both again. `limits` (`Limits`, or a mapping of
+        some) sets the verdict's.
 
         Raises:
             ValueError: an unknown key or a value out of range; it is named.
         """
+        limits = overrides.pop("limits", {})
         plain = {key: value for key, value in overrides.items() if not key.startswith("world.") and key != "world"}
         given = overrides.get("world", {})
         if not isinstance(given, Mapping):
@@ -211,149 +245,9 @@ class Scenario:
             plain[key] = parsed(key, value)
         kept = {key: value for key, value in self.world.items() if key not in plain}
         world = {**kept, **{key: parsed(key, value, "world.") for key, value in hidden.items()}}
-        return replace(self, **plain, world=world)
-
-
-def own_object(
-    model: Path, body: str, contact: str | ArrayLike = "lowest", *, support: str | None = None, chosen: bool = True
-) -> Scenario:
-    """A scenario of an object of your own: turned by 20 degrees about a contact, in 2 s.
-
-    Args:
-        model: MJCF file.
-        body: name of a body that moves freely, or by two slides and a hinge.
-        contact: "vertex", "edge", "lowest", or points (K, 3) in the body frame [m]; see `models.candidates.stance`.
-        support: name of the plane or box geom that it stands on; None: the only plane.
-        chosen: simulate it with the contact and solver parameters of the shipped scenes (`models/settings.xml`).
-    """
-    return Scenario(
-        "pivot",
-        f"{body} of {model.name} about its {contact if isinstance(contact, str) else 'given contact'}",
-        scene=Path(model),
-        body=body,
-        support=support,
-        contact=contact,
-        chosen=chosen,
-        reference="arc",
-        theta=5.0,
-        theta_end=25.0,
-        seconds=2.0,
-        limits=Limits(slip_m=5e-4, angle_rms_deg=0.1, angle_max_deg=0.2, force_mismatch_rel=0.05, settle_s=0.1),
-    )
-
-
-def scenario(name: str) -> Scenario:
-    """The shipped scenario of that name."""
-    if name not in SCENARIOS:
-        raise fail("scenario", name, "one of " + ", ".join(SCENARIOS) + ", or pivot with a model")
-    return SCENARIOS[name]
-
-
-_PLANNED = Limits(slip_m=1e-4, angle_rms_deg=0.2, angle_max_deg=0.5, force_mismatch_rel=0.05, settle_s=0.1)
-_SPATIAL = Limits(slip_m=1e-4, angle_rms_deg=0.05, angle_max_deg=0.1, force_mismatch_rel=0.03, settle_s=0.1)
-SCENARIOS = {
-    case.name: case
-    for case in (
-        Scenario(
-            "balance-2d",
-            "hold a 1 m, 1 kg block on its corner at 30 deg for 10 s",
-            scene="balance-2d",
-            limits=Limits(slip_m=2e-5, angle_rms_deg=0.005, angle_max_deg=0.005, force_mismatch_rel=0.01, settle_s=0.5),
-        ),
-        Scenario(
-            "incline-2d",
-            "the notes' printed example: 30 deg on a table inclined by 30 deg, on the cone's edge",
-            scene="incline-2d",
-            mu=0.3,
-            world={"mu": 0.4},
-            margin=0.0,
-            length=1.0,
-            seconds=5.0,
-            limits=Limits(slip_m=2e-5, angle_rms_deg=0.005, angle_max_deg=0.005, force_mismatch_rel=0.01, settle_s=0.5),
-        ),
-        Scenario(
-            "pivot-2d",
-            "turn the block about its corner from 10 to 80 deg in 2 s, and back",
-            scene="pivot-2d",
-            reference="return",
-            theta=10.0,
-            seconds=2.0,
-            limits=Limits(slip_m=2e-5, angle_rms_deg=0.02, angle_max_deg=0.05, force_mismatch_rel=0.01, settle_s=0.1),
-        ),
-        Scenario(
-            "snap-2d",
-            "10 to 80 deg in 0.3 s, with a floor under the normal force",
-            scene="snap-2d",
-            reference="arc",
-            theta=10.0,
-            seconds=0.3,
-            f_min=50.0,
-            limits=Limits(slip_m=1e-4, angle_rms_deg=0.1, angle_max_deg=0.2, force_mismatch_rel=0.05, settle_s=0.1),
-        ),
-        Scenario(
-            "mpc-2d",
-            "10 to 80 deg in 1 s by a receding horizon, with a force of at most 0.8 of the weight",
-            scene="pivot-2d",
-            reference="arc",
-            theta=10.0,
-            seconds=1.0,
-            plan_hz=100.0,
-            force_max=8.0,
-            limits=_PLANNED,
-        ),
-        Scenario(
-            "balance-3d",
-            "a 1 x 0.7 x 1.4 m block on one vertex, its body diagonal vertical, for 10 s",
-            scene="balance-3d",
-            contact="vertex",
-            about="yaw",
-            theta=0.0,
-            limits=_SPATIAL,
-        ),
-        Scenario(
-            "spin-3d",
-            "the block on that vertex, 90 deg of yaw in 2 s",
-            scene="spin-3d",
-            contact="vertex",
-            about="yaw",
-            reference="arc",
-            theta=0.0,
-            theta_end=90.0,
-            seconds=2.0,
-            limits=_SPATIAL,
-        ),
-        Scenario(
-            "pivot-3d",
-            "the block about an edge, two contacts, from 10 to 80 deg in 2 s",
-            scene="pivot-3d",
-            contact="edge",
-            reference="arc",
-            theta=10.0,
-            seconds=2.0,
-            limits=_SPATIAL,
-        ),
-        Scenario(
-            "mpc-3d",
-            "the block about an edge by a receding horizon, from 10 to 80 deg in 2 s",
-            scene="pivot-3d",
-            contact="edge",
-            reference="arc",
-            theta=10.0,
-            seconds=2.0,
-            plan_hz=100.0,
-            force_max=8.0,
-            limits=_PLANNED,
-        ),
-        Scenario(
-            "settle-3d",
-            "the block lowered about an edge until it lies on its face, without bouncing, in 2 s",
-            scene="settle-3d",
-            contact="edge",
-            reference="arc",
-            theta=20.0,
-            theta_end=0.0,
-            seconds=2.0,
-            limits=replace(_SPATIAL, contacts_end=4),
-        ),
-    )
-}
+        names = {
+            *plain,
+            *(f"world.{key}" for key in hidden),
+            *(f"limit.{key}" for key in (limits if isinstance(limits, Mapping) else ())),
+        }
+        return replace(self, **plain, world=world, limits=self.limits.change(limits), given=self.given | names)

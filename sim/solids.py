@@ -5,8 +5,9 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.models.frames import matrix
 from pivoting.models.hull import circle, colliding, ellipsoids, samples
-from pivoting.models.reading import RigidBody, matrix
+from pivoting.models.reading import RigidBody
 from scipy.spatial import ConvexHull
 
 Array = NDArray[np.float64]

@@ -180,11 +180,11 @@ def test_a_bound_is_a_heavier_weight(controller: WrenchController, kind: str) ->
     belief, work, units = controller.belief, controller.workspace(), controller.units
 
     def step(bounds: WrenchBounds, angle: float, wanted: float) -> tuple[np.ndarray, ...]:
-        out = np.empty((1, nw)), np.empty((1, n)), np.empty(1), np.empty(1, np.int8)
+        out = np.empty((1, nw)), np.empty((1, nw)), np.empty((1, n)), np.empty(1), np.empty(1, np.int8)
         q, q_d = tilted(angle)[None], tilted(wanted)[None]
-        step_worlds(belief, bounds.stacked(nw), work, 1e-9, q, still, q_d, still, still, *out)
-        assert out[3][0] == 0
-        return tuple(values[0] for values in out)
+        step_worlds(belief, bounds.stacked(nw), work, 1e-9, q, still, q_d, still, still, np.zeros((1, nw)), *out)
+        assert out[4][0] == 0
+        return tuple(values[0] for values in out[:3])
 
     def cost(wrench: np.ndarray, force: np.ndarray) -> float:
         return float(wrench @ controller.Q_w @ wrench + force @ controller.Q_f @ force)
@@ -192,11 +192,13 @@ def test_a_bound_is_a_heavier_weight(controller: WrenchController, kind: str) ->
     for case in range(100):
         angle = rng.uniform(0.05, 1.4)
         wanted = angle + rng.normal() * 0.02
-        free, force, *_ = step(WrenchBounds(), angle, wanted)
+        required, free, force = step(WrenchBounds(), angle, wanted)
         most = np.linalg.norm(free[:dim]) if case % 2 else np.linalg.norm(free[dim:])
         bounds = WrenchBounds(**{"force" if case % 2 else "moment": rng.uniform(0.6, 0.99) * most})
-        wrench, pushed, *_ = step(bounds, angle, wanted)
-        required = controller.jacobian(tilted(angle)) @ force + free
+        same, wrench, pushed = step(bounds, angle, wanted)
+        np.testing.assert_array_equal(same, required)
+        missing = controller.jacobian(tilted(angle)) @ force + free - required
+        assert np.abs(missing / units.wrench).max() <= 1e-12
         if bounds.excess(wrench) > 1e-9:
             left += 1
             np.testing.assert_array_equal(wrench, free)

@@ -1,6 +1,7 @@
 """The command line as a stranger uses it: real processes, exit codes, one line for a wrong call."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -17,12 +18,13 @@ KEYS = {
 }  # fmt: skip
 
 
-def pivoting(*words: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+def pivoting(*words: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "pivoting.sim", *words],
         capture_output=True,
         text=True,
         cwd=cwd,
+        env={**os.environ, **environment},
         timeout=300,
         check=False,
     )
@@ -73,7 +75,7 @@ def test_run_writes_recording_and_summary(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "pass" in done.stdout
     out = tmp_path / "new" / "folder"
-    assert sorted(path.name for path in out.iterdir()) == ["snap-2d.rrd", "summary.json"]
+    assert sorted(path.name for path in out.iterdir()) == ["snap-2d.rrd", "snap-2d.summary.json", "summary.json"]
     assert json.loads((out / "summary.json").read_text())["verdict"] == "pass"
 
 
@@ -105,6 +107,15 @@ def test_a_diverged_run_is_still_json() -> None:
         (["run", "pivot-2d", "--set", "world=3"], "world = '3': must be a mapping"),
         (["run", "pivot-2d", "--set", "theta"], "'theta': must be KEY=VALUE"),
         (["run", "pivot-2d", "--set", "world.law=static"], "world.law"),
+        (["run", "pivot-2d", "--set", "mu=.2", "--set", "mu=.3"], "--set 'mu=.3': mu is already given as .2"),
+        (["run", "pivot-2d", "--set", "force_max=0.8x"], "force_max = '0.8x': must be a number, or in weights"),
+        (["run", "pivot-2d", "--limit", "slip=1"], "limits.slip = '1': must be a known limit: slip_m"),
+        (["run", "pivot-2d", "--limit", "slip_m=x"], "limits.slip_m = 'x': must be a number"),
+        (["run", "pivot-2d", "--limit", "slip_m=1", "--limit", "slip_m=2"], "slip_m is already given as 1"),
+        (["run", "pivot-2d", "--contact", ""], "--contact: only the scenario pivot takes it"),
+        (["run", "pivot-2d", "--worlds", "10000000000000"], "worlds = 10000000000000: must be at most 2105"),
+        (["run", "pivot-2d", "--record-world", "0"], "--record-world 0: must be given with --out"),
+        (["run", "pivot-2d", "--out", ""], "--out '': must be a folder"),
         (["run", "pivot-2d", "--worlds", "0"], "'--worlds': 0 is not in the range"),
         (["run", "pivot-2d", "--seed", "x"], "'--seed': 'x' is not a valid integer"),
         (["run"], "Missing argument 'SCENARIO'"),
@@ -149,7 +160,51 @@ def test_out_that_is_a_file_is_refused_before_the_run(tmp_path: Path) -> None:
 def test_help_and_version() -> None:
     assert pivoting("--help").returncode == 0
     assert pivoting("--version").stdout.startswith("pivoting 0.")
-    assert "KEY=VALUE" in pivoting("run", "--help").stdout
+
+
+def test_help_of_run_lists_the_keys() -> None:
+    """With unit, range, default and meaning."""
+    told = " ".join(pivoting("run", "--help").stdout.split())
+    assert "--set KEY=VALUE" in told
+    for words in (
+        "theta_end angle to which an arc leads (likewise) [>= 0.1 and <= 89.9 deg; default: 80]",
+        "force_max greatest force [> 0 and <= 1e+09 N, or 2w; default: none]",
+        "slip_m [>= 0; default: 0.0001]",
+    ):
+        assert words in told
+
+
+def test_limits_and_worlds_of_a_run(tmp_path: Path) -> None:
+    """A limit of one's own fails some of the worlds: which, and which is recorded, is said; here is a folder."""
+    words = ["run", "snap-2d", "--worlds", "12", "--set", "spread=0.05", "--out", "."]
+    free = pivoting(*words, cwd=tmp_path)
+    assert free.returncode == 0, free.stderr
+    errors = json.loads((tmp_path / "summary.json").read_text())
+    assert errors["failed_worlds"] == []
+    limit = errors["slip_max_m"] * 0.999999
+    held = pivoting(*words, "--limit", f"slip_m={limit!r}", "--record-world", "3", cwd=tmp_path)
+    assert held.returncode == 1
+    told = json.loads((tmp_path / "snap-2d.summary.json").read_text())
+    assert told["limits"]["slip_m"] == limit
+    assert told["changes"]["limit.slip_m"] == limit
+    assert len(told["failed_worlds"]) == 1
+    assert told["recorded_world"] == 3
+    said = " ".join(held.stdout.split())
+    assert f"the worst world is {told['worst_world']}; those that fail are {told['failed_worlds'][0]} " in said
+    assert "replaced snap-2d.summary.json" in said
+    assert "world 3 of 12 is in snap-2d.rrd" in said
+    assert "world 3 of 12 is" not in free.stdout
+
+
+def test_no_recording_where_rerun_is_off(tmp_path: Path) -> None:
+    """One line says why; stderr has nothing else."""
+    done = pivoting("run", "snap-2d", "--json", "--out", str(tmp_path), RERUN="off")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["recording"] is None
+    lines = done.stderr.strip().splitlines()
+    assert lines[-1] == "nothing is recorded: RERUN=off is set in the environment"
+    assert len(lines) == 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["snap-2d.summary.json", "summary.json"]
 
 
 OWN = """<mujoco><worldbody><geom type="plane" size="1 1 1"/><body name="can" pos="0 0 .2"><freejoint/>
@@ -167,17 +222,20 @@ def test_an_object_of_ones_own(tmp_path: Path) -> None:
     assert summary["verdict"] == "pass"
     assert summary["body"] == "can"
     assert len(summary["contacts"]) == 1
-    assert sorted(path.name for path in out.iterdir()) == ["pivot.rrd", "summary.json"]
+    assert sorted(path.name for path in out.iterdir()) == [
+        "pivot-can-vertex.rrd", "pivot-can-vertex.summary.json", "summary.json",
+    ]  # fmt: skip
     for arguments, message in (
         ([*own[:4]], "--body is missing"),
         (["run", "pivot-2d", "--body", "can"], "only the scenario pivot takes it"),
         ([*own, "--contact", "1,2"], "in the body frame"),
         ([*own, "--contact", "a,b,c"], "--contact 'a,b,c'"),
+        ([*own, "--contact", ""], "contact = ''"),
         ([*own, "--contact", "edge"], "contact = 'edge'"),
         ([*own, "--set", "size=1"], "size = 1: the body is not a box"),
         ([*own, "--set", "theta_end=170"], "reference = .*angles from 5 to 170 deg"),
         ([*own, "--support", "moon"], "support = 'moon'"),
-        (["run", "pivot", "--model", str(tmp_path), "--body", "can"], "not a readable MJCF file"),
+        (["run", "pivot", "--model", str(tmp_path), "--body", "can"], "it is a directory"),
     ):
         wrong = pivoting(*arguments, "--out", str(tmp_path / "other"))
         assert wrong.returncode == 2

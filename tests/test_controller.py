@@ -2,61 +2,116 @@
 
 import os
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from pivoting.controller import Body, Contact, Law, Motion, WrenchBounds, WrenchController, solve
 from pivoting.controller.controller import step_worlds, world_wrench
 from pivoting.controller.stale import drop_stale_kernels
+from scipy.spatial.transform import Rotation
 
 BLOCK = WrenchController(
     Body(2.0, 0.3), [Contact((-0.4, -0.6), 0.35, f_min=3.0)], Law.dynamic(), (1.0, -9.0), margin=0.1
 )
 
-FREE = WrenchBounds().stacked(3)
+EDGE = WrenchController(
+    Body(2.0, np.diag([0.4, 0.5, 0.3])),
+    [Contact((-0.5, -0.35, -0.7), 0.5, 0.2), Contact((-0.5, 0.35, -0.7), 0.5, 0.2)],
+    Law.static(),
+    (0.0, 0.0, -10.0),
+)
 
 
-def at(desired: Motion) -> list[np.ndarray]:
-    """The same reference for all worlds."""
-    return [values[None] for values in BLOCK.space.lift_motion(desired)]
+class Stepped(NamedTuple):
+    """What `step_worlds` writes."""
+
+    required: np.ndarray
+    wrench: np.ndarray
+    force: np.ndarray
+    residual: np.ndarray
+    status: np.ndarray
+
+
+def stepped(
+    controller: WrenchController,
+    q: np.ndarray,
+    omega: np.ndarray,
+    desired: Motion,
+    external: np.ndarray | None = None,
+    tolerance: float = 1e-9,
+) -> Stepped:
+    """One step of worlds at q (W, 4), omega (W, 3), with the same reference for all."""
+    W, nw, n = len(q), len(controller.Q_w), len(controller.Q_f)
+    out = Stepped(np.ones((W, nw)), np.ones((W, nw)), np.ones((W, n)), np.ones(W), np.full(W, 9, np.int8))
+    reference = [values[None] for values in controller.space.lift_motion(desired)]
+    known = np.zeros((1, nw)) if external is None else external
+    free = WrenchBounds().stacked(nw)
+    step_worlds(controller.belief, free, controller.workspace(), tolerance, q, omega, *reference, known, *out)
+    return out
 
 
 def test_many_worlds_are_as_many_problems() -> None:
     rng = np.random.default_rng(4)
-    thetas, omegas = rng.uniform(0.1, 1.4, 50), rng.normal(size=50)
+    thetas, omegas, external = rng.uniform(0.1, 1.4, 50), rng.normal(size=50), rng.normal(size=(50, 3))
     desired = Motion(0.7, 0.2, -1.0)
-    wrench, force, residual, status = np.empty((50, 3)), np.empty((50, 2)), np.empty(50), np.empty(50, np.int8)
-    q, omega = BLOCK.space.orientation(thetas), BLOCK.space.axial(omegas)
-    out = (wrench, force, residual, status)
-    step_worlds(BLOCK.belief, FREE, BLOCK.workspace(), 1e-9, q, omega, *at(desired), *out)
-    assert not status.any()
+    many = stepped(BLOCK, BLOCK.space.orientation(thetas), BLOCK.space.axial(omegas), desired, external)
+    assert not many.status.any()
     for i in range(50):
-        solution = solve(BLOCK.problem(Motion(thetas[i], omegas[i]), desired))
-        np.testing.assert_allclose(wrench[i], solution.wrench, rtol=1e-12, atol=1e-12)
-        np.testing.assert_allclose(force[i], solution.force[0], rtol=1e-12, atol=1e-12)
-        assert residual[i] == pytest.approx(solution.residual, abs=1e-15)
+        solution = solve(BLOCK.problem(Motion(thetas[i], omegas[i]), desired, external=external[i]))
+        np.testing.assert_allclose(many.required[i], solution.problem.required, rtol=1e-13, atol=1e-13)
+        np.testing.assert_allclose(many.wrench[i], solution.wrench, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(many.force[i], solution.force[0], rtol=1e-12, atol=1e-12)
+        assert many.residual[i] == pytest.approx(solution.residual, abs=1e-15)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("shared", [True, False], ids=["the same for all", "of each world"])
+def test_with_a_known_wrench_at_work_the_object_balances(dim: int, shared: bool) -> None:
+    """Weight, contact forces at their levers, the answer and what is known sum to nothing, worked out in world axes."""
+    rng, axes = np.random.default_rng(8), Rotation.from_rotvec
+    if dim == 2:
+        controller = WrenchController(BLOCK.body, BLOCK.contacts, Law.static(), (1.0, -9.0))
+        points, turns = np.array([[-0.4, 0.0, -0.6]]), [axes([0.0, -angle, 0.0]) for angle in (0.2, 0.9)]
+        weight = 2.0 * np.array([1.0, 0.0, -9.0])
+    else:
+        controller, points = EDGE, np.array([[-0.5, -0.35, -0.7], [-0.5, 0.35, -0.7]])
+        turns, weight = [axes([0.0, -0.3, 0.1]), axes([0.1, -1.0, 0.0])], np.array([0.0, 0.0, -20.0])
+    q = np.array([np.roll(turn.as_quat(), 1) for turn in turns])
+    known = rng.normal(size=(1 if shared else 2, len(controller.Q_w)))
+    desired = Motion(0.5) if dim == 2 else Motion(q[0])
+    out = stepped(controller, q, np.zeros((2, 3)), desired, known)
+    assert not out.status.any()
+    for i, turn in enumerate(turns):
+        state = Motion((0.2, 0.9)[i]) if dim == 2 else Motion(q[i])
+        alone = solve(controller.problem(state, external=known[i % len(known)]))
+        for wrench, forces in ((out.wrench[i], out.force[i].reshape(-1, dim)), (alone.wrench, alone.force)):
+            applied = wrench + known[i % len(known)]
+            if dim == 2:  # (F_x, F_z, M about -y)
+                force, moment = np.array([applied[0], 0.0, applied[1]]), np.array([0.0, -applied[2], 0.0])
+                forces = np.insert(forces, 1, 0.0, axis=1)
+            else:
+                force, moment = applied[:3], applied[3:]
+            levers = turn.apply(points)
+            np.testing.assert_allclose(turn.apply(force) + forces.sum(axis=0) + weight, 0.0, atol=1e-12)
+            about = np.cross(levers, forces).sum(axis=0)
+            np.testing.assert_allclose(turn.apply(moment) + about, 0.0, atol=1e-12)
 
 
 def test_a_state_that_is_not_a_number_has_no_answer_and_applies_nothing() -> None:
     q = np.stack([BLOCK.space.orientation(0.5), np.full(4, np.nan)])
-    omega = np.zeros((2, 3))
-    wrench, force, residual, status = np.ones((2, 3)), np.ones((2, 2)), np.zeros(2), np.zeros(2, np.int8)
-    out = (wrench, force, residual, status)
-    step_worlds(BLOCK.belief, FREE, BLOCK.workspace(), 1e-9, q, omega, *at(Motion(0.5)), *out)
-    assert status.tolist() == [0, 2]
-    assert np.isnan(wrench[1]).all()
+    out = stepped(BLOCK, q, np.zeros((2, 3)), Motion(0.5))
+    assert out.status.tolist() == [0, 2]
+    assert np.isnan(out.wrench[1]).all()
     applied = np.ones((2, 6))
-    world_wrench(BLOCK.belief.wrench_map, q, wrench, applied)
+    world_wrench(BLOCK.belief.wrench_map, q, out.wrench, applied)
     assert applied[0].any()
     assert not applied[1].any()
 
 
 def test_a_tolerance_that_is_not_met_is_a_status() -> None:
     q, omega = BLOCK.space.orientation(np.array([0.5])), np.zeros((1, 3))
-    wrench, force, residual, status = np.ones((1, 3)), np.ones((1, 2)), np.zeros(1), np.zeros(1, np.int8)
-    out = (wrench, force, residual, status)
-    step_worlds(BLOCK.belief, FREE, BLOCK.workspace(), -1.0, q, omega, *at(Motion(0.5)), *out)
-    assert status.tolist() == [1]
+    assert stepped(BLOCK, q, omega, Motion(0.5), tolerance=-1.0).status.tolist() == [1]
 
 
 def test_kernels_compiled_of_other_sources_are_dropped(tmp_path: Path) -> None:
@@ -76,6 +131,14 @@ def test_kernels_compiled_of_other_sources_are_dropped(tmp_path: Path) -> None:
     assert set(drop_stale_kernels(tmp_path, cache)) == {index, code}
     assert drop_stale_kernels(tmp_path, cache) == []
     assert not list(cache.glob("*.nb*"))
+
+
+@pytest.mark.parametrize(
+    "external", [[1.0, 2.0], [0.0, 0.0, float("nan")], "none"], ids=["wrong shape", "not finite", "text"]
+)
+def test_a_known_wrench_that_is_none_is_refused(external: object) -> None:
+    with pytest.raises(ValueError, match=r"external = .*: must be"):
+        BLOCK.problem(Motion(0.5), external=external)
 
 
 @pytest.mark.parametrize(

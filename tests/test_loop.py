@@ -7,6 +7,7 @@ import pytest
 from pivoting.controller import Motion, WrenchController, solve
 from pivoting.controller.references import Constant, Sampled
 from pivoting.sim import SCENARIOS, Run, assert_sticking, assert_tracking, simulate
+from pivoting.sim.control import BOUNDED
 from scipy.spatial.transform import Rotation
 
 
@@ -72,6 +73,33 @@ def test_the_loop_solves_the_same_problem_as_people_do(shipped: Callable[[str], 
         other = solve(problem, "clarabel")
         np.testing.assert_allclose(run.wrench[0, k], other.wrench, atol=1e-6)
         np.testing.assert_allclose(run.force[0, k], other.force, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "keys"),
+    [
+        ("pivot-2d", {}),
+        ("pivot-2d", {"moment_max": 3.0, "theta": 60.0}),
+        ("pivot-2d", {"force_rate": 60.0, "spread": 0.1}),
+        ("pivot-3d", {}),
+        ("mpc-2d", {}),
+        ("mpc-2d", {"open_loop": True, "plan_step": 0.005}),
+    ],
+    ids=["law", "a bound", "a bound on a rate", "space", "horizon", "a plan played"],
+)
+def test_what_is_required_is_what_contacts_and_wrench_make(name: str, keys: dict) -> None:
+    """J f + w in every control, where nothing was given up for a bound."""
+    run = simulate(name, worlds=2, seed=2, seconds=0.3, **keys)
+    controller, exact = run.attached.controller, 0
+    for i in range(run.worlds):
+        for k in range(0, run.time.size - 1, 10):
+            made = controller.jacobian(run.quaternion[i, k]) @ run.force[i, k].ravel() + run.wrench[i, k]
+            exact += run.status[i, k] == 0
+            off = np.abs((made - run.required[i, k]) / controller.units.wrench).max()
+            assert off <= 1e-12 or (run.status[i, k] == BOUNDED and off >= 1e-6)
+    assert exact > 30
+    assert not run.required.flags.writeable
+    assert run.required.shape == run.wrench.shape
 
 
 def test_energy_is_accounted_for(shipped: Callable[[str], Run]) -> None:

@@ -42,7 +42,7 @@ def test_mpc_3d() -> None:
     assert run.verdict == "pass"
     assert_sticking(run, slip_m=1e-4)
     assert_tracking(run, rms_deg=0.2)
-    assert sizes(run)[0].max() <= run.scenario.bounds().force * (1.0 + 1e-6)
+    assert sizes(run)[0].max() <= run.scenario.absolute(run.load).bounds().force * (1.0 + 1e-6)
     assert run.plans is not None
     assert not run.plans.outcome.any()
 

@@ -186,10 +186,9 @@ def test_what_cannot_be_pivoted_is_refused_with_a_reason(tmp_path: Path) -> None
     refused(tmp_path, world.format('<freejoint/><geom size=".1"/>'), "roll")
     refused(tmp_path, world.format('<geom type="box" size=".1 .1 .1"/>'), "no joint, so no free motion")
     cube = world.format('<freejoint/><geom type="box" size=".1 .1 .1"/>')
-    refused(tmp_path, cube, "above the table", [[-0.1, -0.1, 0.1]])
     refused(tmp_path, cube, "no corner of body 'b'", [[-0.05, -0.1, -0.1]])
     refused(tmp_path, cube, "contact = 'floor'", "floor")
-    refused(tmp_path, cube.replace("plane", "sphere"), "support = None: the model has 0 planes")
+    refused(tmp_path, cube.replace("plane", "sphere"), "support = .*sphere of the world.*must be a plane, a box or an")
 
 
 def test_references_on_so3_in_a_loop_of_ones_own() -> None:

@@ -22,6 +22,33 @@ def test_derivatives(name: str) -> None:
     np.testing.assert_allclose(acceleration, (after[1] - before[1]) / (2 * h), atol=2e-3)
 
 
+@pytest.mark.parametrize(
+    "reference",
+    [Constant(1), MinimumJerk((0, 1), 2, 1), Sine(0, 1, 2), Sampled([0, 0, 0, 1, 2, 2, 2], 1)],
+    ids=lambda reference: type(reference).__name__,
+)
+def test_whole_numbers_are_as_good_as_any(reference: Reference) -> None:
+    """Of which a reference is made, or at which it is asked for; one time gives one value of each."""
+    for time in (0, 1, 0.5):
+        values = reference(time)
+        assert [np.shape(value) for value in values] == [()] * 3
+        assert [np.asarray(value).dtype for value in values] == [float] * 3
+        many = reference([time, time])
+        np.testing.assert_array_equal(many, np.stack([values] * 2, axis=1))
+
+
+@pytest.mark.parametrize(
+    ("name", "duration"), [("constant", np.inf), ("arc", 2.9), ("sine", np.inf), ("samples", 2.95)]
+)
+def test_every_reference_says_when_it_ends(name: str, duration: float) -> None:
+    reference: Reference = ALL[name]
+    assert reference.duration == pytest.approx(duration)
+    if np.isfinite(duration):
+        last, after = reference(duration), reference(duration + 1.0)
+        assert float(after[0]) == pytest.approx(float(last[0]), abs=1e-12)
+        assert float(after[1]) == float(after[2]) == 0.0
+
+
 def test_minimum_jerk_rests_at_its_waypoints() -> None:
     arc = MinimumJerk((0.2, 1.3, 0.4), 1.0, 0.3)
     assert arc.duration == pytest.approx(2.9)

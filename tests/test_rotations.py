@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from pivoting.controller.references import Constant, MinimumJerk, Sine
+from pivoting.controller.references import Constant, MinimumJerk, Reference, Sine
 from pivoting.controller.rotations import SampledRotation, Turn, Waypoints
 from scipy.spatial.transform import Rotation
 
@@ -34,6 +34,27 @@ def test_rates_and_accelerations_are_derivatives(name: str) -> None:
     smooth = np.ones(len(t), bool) if name != "samples" else np.abs(t / 0.05 % 1.0 - 0.5) < 0.49
     change = (np.asarray(after[1]) - np.asarray(before[1])) / (2 * h)
     np.testing.assert_allclose(acceleration[smooth], change[smooth], atol=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "duration"),
+    [("constant", np.inf), ("arc", 1.9), ("sine", np.inf), ("waypoints", 2.2), ("samples", 2.2)],
+)
+def test_every_reference_says_when_it_ends(name: str, duration: float) -> None:
+    """A turn when its angle does; and one time gives one value of each."""
+    reference: Reference = ALL[name]
+    assert reference.duration == pytest.approx(duration)
+    assert [np.shape(value) for value in reference(1)] == [(4,), (3,), (3,)]
+    if np.isfinite(duration):
+        last, after = reference(duration), reference(duration + 1.0)
+        assert abs(np.dot(last[0], after[0])) == pytest.approx(1.0, abs=1e-12)
+        assert not np.any(after[1:])
+
+
+def test_a_turn_by_a_plain_function_goes_on_for_ever() -> None:
+    turn = Turn(lambda times: (np.sin(times), np.cos(times), -np.sin(times)), [0.0, 1.0, 0.0])  # type: ignore[arg-type]
+    assert turn.duration == np.inf
+    assert np.shape(turn(0.5)[0]) == (4,)
 
 
 def test_waypoints_are_met_at_rest_by_the_shorter_way() -> None:

@@ -1,0 +1,194 @@
+"""What went wrong in a run, measured again by MuJoCo alone: the start and wrenches of the run, stepped by `mj_step`.
+
+Of the project only arrays are used. Everything is read from `data.contact` and `data.qpos`: how far the contacts moved
+along the table, how long nothing carried, how long the friction was used up, which other geoms touched, how deep.
+"""
+
+import re
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+NEAR = 0.02  # of the lever: a contact that close to what is held is one of it
+CARRIES = 1e-6  # of the weight: less is no load
+USED_UP = 0.999  # of the friction
+
+
+class Tape(NamedTuple):
+    """A run of one world.
+
+    Attributes:
+        model, body: the body's index in it.
+        qpos (nq,), qvel (nv,): at the start.  wrench: (N, 6) force and torque at the CoM, world axes.
+        held: (K, 3) what is to stick, or the centres of what is to roll, body frame [m].  radius: (K,) of that, else 0.
+        table: (3, 3) columns (t, o, n), world axes.
+        desired: (N+1, 4) orientations of the body, to world.
+        force: (N, 3) net contact force that was predicted, world axes.
+        settle: steps that do not count.
+    """
+
+    model: mujoco.MjModel
+    body: int
+    qpos: Array
+    qvel: Array
+    wrench: Array
+    held: Array
+    radius: Array
+    table: Array
+    desired: Array
+    force: Array
+    settle: int
+
+
+class Facts(NamedTuple):
+    """What MuJoCo alone shows; all but the slip after the steps that do not count.
+
+    Attributes:
+        slip_m: greatest distance along the table of what is to stick from where it was.
+        lost_s: time in which nothing carries, or something that is to stick is lifted off.
+        slides_s: time in which |f_t| of a contact that carries is at mu f_n.
+        others: seconds in which something else carries, by the two geoms that meet.
+        deepest_m: greatest penetration.
+        angle_rms_deg, angle_max_deg: off the desired orientation.
+        mismatch: RMS of net contact force less the predicted over RMS of the predicted.
+        diverged_s: when the state was no longer finite, else inf.
+    """
+
+    slip_m: float
+    lost_s: float
+    slides_s: float
+    others: dict[str, float]
+    deepest_m: float
+    angle_rms_deg: float
+    angle_max_deg: float
+    mismatch: float
+    diverged_s: float
+
+
+def replay(tape: Tape) -> Facts:
+    """Step it, and look."""
+    model, dt = tape.model, float(tape.model.opt.timestep)
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    data.qpos[:], data.qvel[:] = tape.qpos, tape.qvel
+    weight = float(model.body_mass[tape.body] * np.linalg.norm(model.opt.gravity))
+    lever = float(np.linalg.norm(tape.held - model.body_ipos[tape.body], axis=1).max())
+    first: Array | None = None
+    slips, lost, slides, deepest, others, angles, off, wanted = [0.0], 0, 0, 0.0, {}, [], [], []
+    diverged, rolled = np.inf, np.zeros((len(tape.held), 3))
+    for k, wrench in enumerate(tape.wrench):
+        data.xfrc_applied[tape.body] = np.nan_to_num(wrench)
+        mujoco.mj_step(model, data)  # kinematics and contacts are of the start of the step
+        if not (np.isfinite(data.qpos).all() and np.isfinite(data.qacc).all()):
+            diverged = k * dt
+            break
+        R = data.xmat[tape.body].reshape(3, 3)
+        held = (data.xpos[tape.body] + tape.held @ R.T) @ tape.table - np.outer(tape.radius, [0.0, 0.0, 1.0])
+        omega = data.qvel[-3:] if model.nv == 3 else R @ data.qvel[_dofs(model, tape.body)][3:]
+        first = held if first is None else first
+        slips.append(float(np.linalg.norm((held - first - rolled)[:, :2], axis=1).max()))
+        rolled = rolled + dt * np.cross(omega @ tape.table, np.outer(tape.radius, [0.0, 0.0, 1.0]))
+        found = [*_contacts(model, data, tape.body)]
+        carrying = [row for row in found if row.normal > CARRIES * weight]
+        if k < tape.settle:
+            continue
+        near = NEAR * lever
+        away = [_away((row.at - data.xpos[tape.body]) @ R, tape) for row in carrying]
+        mine = [row for row, distance in zip(carrying, away, strict=True) if distance <= near]
+        lifted = (held - first)[:, 2].max() > 1e-4 * lever
+        lost += not mine or bool(lifted)
+        slides += any(row.tangential >= USED_UP * row.mu * row.normal for row in mine)
+        for pair in {row.pair for row, distance in zip(carrying, away, strict=True) if distance > near}:
+            others[pair] = others.get(pair, 0.0) + dt
+        deepest = max([deepest, *(row.depth for row in found)])
+        angles.append(_angle(data.xquat[tape.body], tape.desired[k]))
+        off.append(np.sum([row.force for row in found], axis=0) - tape.force[k] if found else -tape.force[k])
+        wanted.append(tape.force[k])
+    rms = [float(np.sqrt(np.nanmean(np.square(values)))) if len(values) else np.nan for values in (off, wanted, angles)]
+    return Facts(
+        max(slips),
+        lost * dt,
+        slides * dt,
+        others,
+        deepest,
+        rms[2],
+        max(angles, default=np.nan),
+        rms[0] / rms[1],
+        diverged,
+    )
+
+
+class _Row(NamedTuple):
+    pair: str
+    at: Array
+    normal: float
+    tangential: float
+    mu: float
+    depth: float
+    force: Array
+
+
+def _contacts(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> list[_Row]:
+    """The contacts of a body, the forces on it in world axes."""
+    out = []
+    for i, contact in enumerate(data.contact):
+        ends = [int(model.body_weldid[model.geom_bodyid[geom]]) for geom in contact.geom]
+        if model.body_weldid[body] not in ends or contact.efc_address < 0:
+            continue
+        local = np.zeros(6)
+        mujoco.mj_contactForce(model, data, i, local)
+        sign = 1.0 if ends[1] == model.body_weldid[body] else -1.0
+        force = sign * contact.frame.reshape(3, 3).T @ local[:3]
+        names = sorted(model.geom(int(geom)).name or f"#{int(geom)}" for geom in contact.geom)
+        tangential = float(np.linalg.norm(local[1:3]))
+        out.append(
+            _Row(
+                " and ".join(names), contact.pos.copy(), local[0], tangential, contact.friction[0], -contact.dist, force
+            )
+        )
+    return out
+
+
+def _away(point: Array, tape: Tape) -> float:
+    """Distance of a point in the body frame from what is held: points, the line between two, or a ball's surface."""
+    a, b = tape.held[0], tape.held[-1]
+    share = np.clip((point - a) @ (b - a) / max(float((b - a) @ (b - a)), 1e-300), 0.0, 1.0)
+    return float(abs(np.linalg.norm(point - a - share * (b - a)) - tape.radius[0]))
+
+
+def _angle(one: Array, other: Array) -> float:
+    """Between two orientations [deg]."""
+    return float(np.rad2deg(2.0 * np.arccos(min(1.0, abs(float(one @ other))))))
+
+
+def _dofs(model: mujoco.MjModel, body: int) -> slice:
+    first = int(model.body_dofadr[body])
+    return slice(first, first + int(model.body_dofnum[body]))
+
+
+def confirms(sentence: str, facts: Facts, limits: dict[str, float], lever: float) -> bool:
+    """Whether the facts bear out all that a sentence says.
+
+    Args:
+        sentence: the reason that a run gave.
+        limits: of its verdict.
+        lever: [m].
+    """
+    claims = {
+        r"slip|slid": facts.slip_m > limits["slip_m"] or facts.slides_s > 0.0,
+        r"friction_use|friction (is )?used|cone": facts.slides_s > 0.0,
+        r"contact_lost|lets? go|left the table|lifts? off|bounc|no contact": facts.lost_s > 0.0,
+        r"undeclared|touche[sd]|another": bool(facts.others),
+        r"penetrat|deep|sinks": facts.deepest_m > limits.get("penetration_rel", 0.01) * lever,
+        r"angle|tilt|RMS": not (
+            facts.angle_rms_deg <= limits["angle_rms_deg"] and facts.angle_max_deg <= limits["angle_max_deg"]
+        ),
+        r"force_mismatch|predicted (contact )?force": not facts.mismatch <= limits["force_mismatch_rel"],
+        r"diverge": facts.diverged_s < np.inf,
+    }
+    made = [true for pattern, true in claims.items() if re.search(pattern, sentence)]
+    return bool(made) and all(made)

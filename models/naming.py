@@ -1,0 +1,46 @@
+"""Bodies and geoms by name, or by '#id' where they have none; and the error that says what cannot be served."""
+
+import mujoco
+
+
+class ModelError(ValueError):
+    """A model, or a body in it, that cannot be served; the message says why and what would be."""
+
+
+def body_id(model: mujoco.MjModel, name: str) -> int:
+    """Id of the body called `name`, or with the id that '#id' gives.
+
+    Raises:
+        ModelError: there is none; those that there are are listed.
+    """
+    bodies = {model.body(i).name or f"#{i}": i for i in range(1, model.nbody)}
+    bodies |= {f"#{i}": i for i in range(1, model.nbody) if f"#{i}" not in bodies}
+    if name not in bodies:
+        shown = ", ".join(repr(model.body(i).name or f"#{i}") for i in range(1, model.nbody))
+        raise ModelError(f"body = {name!r}: must be one of {shown or '(the model has none)'}")
+    return bodies[name]
+
+
+def geom_id(model: mujoco.MjModel, name: str) -> int:
+    """Id of the geom called `name`, or with the id that '#id' gives, which stands on its own for a support.
+
+    Raises:
+        ModelError: there is none; those that are fixed to the world are listed.
+    """
+    geoms = {model.geom(i).name: i for i in range(model.ngeom) if model.geom(i).name}
+    geoms |= {f"#{i}": i for i in range(model.ngeom) if f"#{i}" not in geoms}
+    if name not in geoms:
+        fixed = [i for i in range(model.ngeom) if model.body_weldid[model.geom_bodyid[i]] == 0]
+        shown = ", ".join(label(model, i) for i in fixed) or "(the model has none)"
+        raise ModelError(f"support = {name!r}: the model has no geom of that name; fixed ones are {shown}")
+    return geoms[name]
+
+
+def label(model: mujoco.MjModel, geom: int) -> str:
+    """A geom in words: its name, or '#id' and whose it is."""
+    name = model.geom(geom).name
+    if name and not name.startswith("#"):
+        return repr(name)
+    kind = mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
+    body = int(model.geom_bodyid[geom])
+    return f"{name or f'#{geom}'!r} ({kind} of {f'body {model.body(body).name!r}' if body else 'the world'})"

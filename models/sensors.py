@@ -1,0 +1,64 @@
+"""The sensors that the loop reads: where the object is, and every contact that it makes."""
+
+from dataclasses import replace
+
+import mujoco
+from pivoting.models.frames import matrix, quaternion
+from pivoting.models.reading import file_frame, read_body
+from pivoting.models.scenes import Scene
+
+SITE = "pivoting/object"  # object axes at the centre of mass
+CONTACTS, SLOTS = 8, 64  # contacts of one geom with its support, at most; those that are listed, at most
+
+
+def instrument(scene: Scene) -> tuple[mujoco.MjModel, dict[str, slice]]:
+    """Compile a scene with a site at the object's axes and CoM and the sensors that the loop reads.
+
+    Returns:
+        The model, and where each reading is in sensordata: position (3) of the CoM, quaternion (4) object to
+        world, velocity (3) of the CoM and angular_velocity (3), world axes; contacts (S, 14): each contact with the
+        support, as `sim.contact_readings` takes them apart; touching (4): number of contacts with anything, and their
+        net force (3), world axes [N].
+    """
+    bare = scene.compile()
+    body = read_body(bare, scene.body, scene.support)
+    origin, axes = file_frame(bare, body.index)
+    spec = scene.spec.copy()
+    site = spec.body(scene.body).add_site(
+        name=SITE, pos=axes.T @ (body.com - origin), quat=quaternion(axes.T @ matrix(body.axes))
+    )
+    del site
+    at_site = {"objtype": mujoco.mjtObj.mjOBJ_SITE, "objname": SITE}
+    kinds = {
+        "position": mujoco.mjtSensor.mjSENS_FRAMEPOS,
+        "quaternion": mujoco.mjtSensor.mjSENS_FRAMEQUAT,
+        "velocity": mujoco.mjtSensor.mjSENS_FRAMELINVEL,
+        "angular_velocity": mujoco.mjtSensor.mjSENS_FRAMEANGVEL,
+    }
+    for name, kind in kinds.items():
+        spec.add_sensor(name=f"pivoting/{name}", type=kind, **at_site)
+    touched = {"reftype": mujoco.mjtObj.mjOBJ_BODY, "refname": scene.body}
+    slots = min(CONTACTS * int(bare.body_geomnum[body.index]), SLOTS)
+    spec.add_sensor(
+        name="pivoting/contacts",
+        type=mujoco.mjtSensor.mjSENS_CONTACT,
+        objtype=mujoco.mjtObj.mjOBJ_GEOM,
+        objname=scene.support,
+        **touched,
+    ).intprm = [_fields("FOUND", "FORCE", "DIST", "POS", "NORMAL", "TANGENT"), 2 if slots == SLOTS else 0, slots]
+    spec.add_sensor(name="pivoting/touching", type=mujoco.mjtSensor.mjSENS_CONTACT, **touched).intprm = [
+        _fields("FOUND", "FORCE"), 3, 1,
+    ]  # fmt: skip
+    spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+    model = replace(scene, spec=spec).compile()
+    where = {}
+    for name in (*kinds, "contacts", "touching"):
+        sensor = model.sensor(f"pivoting/{name}")
+        start = int(sensor.adr[0])
+        where[name] = slice(start, start + int(sensor.dim[0]))
+    return model, where
+
+
+def _fields(*names: str) -> int:
+    """What a contact sensor reports of each contact, as the bits that MuJoCo wants."""
+    return sum(1 << int(getattr(mujoco.mjtConDataField, f"mjCONDATA_{name}")) for name in names)

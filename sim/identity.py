@@ -1,0 +1,34 @@
+"""What tells runs apart: a digest of the world's model, the contacts, and what the controller believes and follows."""
+
+import hashlib
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+
+if TYPE_CHECKING:
+    from pivoting.sim.run import Run
+
+
+def digest(run: "Run") -> str:
+    """Twelve hexadecimal digits; the same for equal runs on any day, whatever was measured in them."""
+    model = np.zeros(mujoco.mj_sizeModel(run.model), np.uint8)
+    mujoco.mj_saveModel(run.model, None, model)
+    given = (model, run.points, run.radius, run.turn, run.reference, run.attached.controller.belief)
+    case = run.scenario.absolute(run.load)
+    words = (case.bounds(), case.limits, case.plan_hz, case.plan_steps, case.plan_step, case.integrator, case.track)
+    out = hashlib.blake2b(digest_size=6)
+    _add(out, (*given, repr(words), run.controller, run.plan is not None))
+    return out.hexdigest()
+
+
+def _add(out: Any, value: Any) -> None:
+    """Of tuples each part, of all else type, shape and content."""
+    if isinstance(value, tuple):
+        for part in value:
+            _add(out, part)
+    elif isinstance(value, str):
+        out.update(value.encode())
+    else:
+        array = np.ascontiguousarray(value)
+        out.update(f"{array.dtype.str}{array.shape}".encode() + array.tobytes())

@@ -1,0 +1,146 @@
+"""The steps of a closed loop: read the state, control, apply, step; and the log of what happened."""
+
+from collections.abc import Callable
+from time import perf_counter, perf_counter_ns
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+from numpy.typing import NDArray
+from pivoting.controller.controller import WrenchController, world_wrench
+from pivoting.sim.contact_readings import FIELDS, ContactReadings, Declared, list_contacts, read_contacts
+from pivoting.sim.control import Answers, Control, States
+from pivoting.sim.fidelity import ContactRows, Held, held
+
+Array = NDArray[np.float64]
+POSE = ("position", "quaternion", "velocity", "angular_velocity")
+BLOCK = 50_000  # worlds times steps whose contacts are sorted at once
+
+
+class Log(NamedTuple):
+    """What the loop keeps, worlds first, read-only.
+
+    Attributes:
+        states: position (W, N+1, 3), quaternion (W, N+1, 4), velocity and angular velocity (W, N+1, 3), world axes.
+        answers: required and wrench (W, N, nw), force (W, N, K d), residual and status (W, N).
+        wrench_world: (W, N, 6).
+        contacts: `ContactReadings`, and held: `Held`, with (W, N) first.
+        control_ns: (N,) for all worlds together.
+        wall_s: of the loop.
+    """
+
+    states: States
+    answers: Answers
+    wrench_world: Array
+    contacts: ContactReadings
+    held: Held
+    control_ns: Array
+    wall_s: float
+
+
+class ContactLog:
+    """Sorts the contacts of every step, block by block: what MuJoCo lists of them would fill the memory."""
+
+    def __init__(
+        self,
+        declared: Declared,
+        rows: ContactRows | None,
+        axes: Array,
+        where: dict[str, slice],
+        steps: int,
+        worlds: int,
+    ):
+        self._declared, self._rows, self._axes, self._where = declared, rows, axes, where
+        K = len(declared.points)
+        self.readings = ContactReadings(
+            *(np.empty((steps, worlds, *rest)) for rest in ((K, 3), (K,), (), (), (), ())),
+        )
+        self.held = Held(
+            np.full((steps, worlds, K, 2), np.nan), np.zeros((steps, worlds, K)), np.zeros((steps, worlds), np.bool_)
+        )
+
+    def sort(self, first: int, states: Array, contacts: Array) -> None:
+        """Sort the contacts (B, W, sensors) of the steps from `first` on, that began at the states (B, W, sensors)."""
+        at = self._declared.touch(*(states[..., self._where[key]] for key in POSE[:2]))
+        sensed, touching = (contacts[..., self._where[key]] for key in ("contacts", "touching"))
+        listed = list_contacts(sensed, at, self._declared)
+        found = sensed[..., ::FIELDS].max(axis=-1)
+        self._keep(first, self.readings, read_contacts(listed, found, touching, self._declared))
+        if self._rows is not None:
+            self._keep(first, self.held, held(self._rows, listed, at, self._axes))
+
+    @staticmethod
+    def _keep(first: int, kept: tuple[Any, ...], read: tuple[Any, ...]) -> None:
+        for values, new in zip(kept, read, strict=True):
+            values[first : first + len(new)] = new
+
+
+def run_steps(
+    batch: Batch,
+    control: Control,
+    controller: WrenchController,
+    contacts: ContactLog,
+    body: int,
+    where: dict[str, slice],
+    steps: int,
+    progress: Callable[[int, int], None] | None,
+) -> Log:
+    """Step all worlds to the end.
+
+    Args:
+        body: id of the object.  where: each reading's place in sensordata.
+        progress: called with (steps done, steps) about a hundred times.
+    """
+    worlds, belief = batch.nsim, controller.belief
+    sensordata, xfrc = batch.bind("sensordata"), batch.bind("xfrc_applied")[:, body]
+    stage = int(mujoco.mjtStage.mjSTAGE_VEL)
+    batch.forward(stage=stage)
+    states = States(*(sensordata[:, where[key]] for key in POSE))
+    pose = slice(where[POSE[0]].start, where[POSE[-1]].stop)
+    nw, n = belief.wrench_map.shape[0], belief.Q_f.shape[0]
+    kept = np.empty((steps + 1, worlds, pose.stop))
+    out = Answers(
+        np.empty((steps, worlds, nw)),
+        np.empty((steps, worlds, nw)),
+        np.empty((steps, worlds, n)),
+        np.empty((steps, worlds)),
+        np.empty((steps, worlds), np.int8),
+    )
+    wrench_world, spent = np.empty((steps, worlds, 6)), np.empty(steps)
+    block = np.empty((max(1, min(steps, BLOCK // worlds)), *sensordata.shape))
+    control.prepare(states, Answers(*(values[0] for values in out)))  # compiled before it is timed
+    world_wrench(belief.wrench_map, states.orientation, out.wrench[0], wrench_world[0])
+    kept[0] = sensordata[:, : pose.stop]
+    report, first = max(1, steps // 100), 0
+    start = perf_counter()
+    for k in range(steps):
+        tick = perf_counter_ns()
+        control(k, states, out.wrench[k - 1] if k else None, Answers(*(values[k] for values in out)))
+        spent[k] = perf_counter_ns() - tick
+        world_wrench(belief.wrench_map, states.orientation, out.wrench[k], wrench_world[k])
+        xfrc[:] = wrench_world[k]
+        batch.step(stage=stage)
+        kept[k + 1] = sensordata[:, : pose.stop]
+        block[k - first] = sensordata
+        if k + 1 - first == len(block) or k + 1 == steps:
+            contacts.sort(first, kept[first : k + 1], block[: k + 1 - first])
+            first = k + 1
+        if progress is not None and (k + 1) % report == 0:
+            progress(k + 1, steps)
+    return Log(
+        states=States(*(_worlds_first(kept[..., where[key]]) for key in POSE)),
+        answers=Answers(*(_worlds_first(values) for values in out)),
+        wrench_world=_worlds_first(wrench_world),
+        contacts=ContactReadings(*(_worlds_first(values) for values in contacts.readings)),
+        held=Held(*(_worlds_first(values) for values in contacts.held)),
+        control_ns=spent,
+        wall_s=perf_counter() - start,
+    )
+
+
+def _worlds_first(values: NDArray[Any]) -> NDArray[Any]:
+    """(step, world, ...) as the read-only view (world, step, ...)."""
+    out = np.moveaxis(values, 1, 0)
+    out.flags.writeable = False
+    return out
