@@ -24,7 +24,7 @@ def main() -> NoReturn:
     code = 0
     try:
         _open_streams()
-        code = _command()()
+        code = _command(interrupt)()
         sys.stdout.flush()
         interrupt.ignore()
     except BrokenPipeError:
@@ -44,7 +44,8 @@ class _Interrupt:
     library hands that on. Where SIGINT is ignored, as of a job in the background, it stays so."""
 
     def __init__(self) -> None:
-        self.came = False
+        self.came = self._due = False
+        self._compilers = 0  # within one another
         self._last = -1.0
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, self._handle)
@@ -53,13 +54,26 @@ class _Interrupt:
         """From here on: all is said and written, or tidied up."""
         signal.signal(signal.SIGINT, signal.SIG_IGN)
 
+    def compiling(self, change: int) -> None:
+        """A compiler begins (1), ends (-1), or goes on (0) with its next pass, where it may be interrupted.
+
+        Anywhere else in it LLVM calls back into Python, and a KeyboardInterrupt there is lost, or crashes the process.
+        """
+        self._compilers += change
+        if self._due and change <= 0:
+            self._due = False
+            raise KeyboardInterrupt
+
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if monotonic() - self._last < 1.0:  # the same wish again would only disturb the tidying up
             return
         self.came, self._last = True, monotonic()
         sys.excepthook = lambda *_: None  # C extensions print what they cannot raise
         sys.unraisablehook = self._again
-        raise KeyboardInterrupt
+        if self._compilers:
+            self._due = True
+        else:
+            raise KeyboardInterrupt
 
     def _again(self, lost: Any) -> None:
         """Raised in a callback or finalizer it would be lost: it comes again, when that is over."""
@@ -76,12 +90,12 @@ def _open_streams() -> None:
             setattr(sys, name, open(descriptor, "w", closefd=False))  # noqa: SIM115
 
 
-def _command() -> Callable[[], int]:
+def _command(interrupt: _Interrupt) -> Callable[[], int]:
     """The command line; what libraries print on stdout as they are imported goes to stderr."""
     kept = os.dup(1)
     os.dup2(2, 1)
     try:
-        _say_when_compiling()
+        _watch_compilers(interrupt)
         from pivoting.sim.cli import main as command
 
         sys.stdout.flush()
@@ -91,29 +105,37 @@ def _command() -> Callable[[], int]:
     return command
 
 
-def _say_when_compiling() -> None:
+def _watch_compilers(interrupt: _Interrupt) -> None:
     """One line on stderr when, and only when, something is compiled rather than taken from the cache."""
     from numba.core import event
 
-    class Told(event.Listener):  # type: ignore[misc]
+    class Watch(event.Listener):  # type: ignore[misc]
         said = False
 
         def on_start(self, started: event.Event) -> None:
-            if self.said:
-                return
-            self.said = True
-            from pivoting.controller.kernel import CACHE  # whatever compiles has imported it
-
-            if CACHE is None:
-                where = "in memory, in every run: no folder for a cache can be written to; NUMBA_CACHE_DIR sets one"
+            if started.kind == "numba:compiler_lock":  # also held to load from the cache
+                interrupt.compiling(1)
             else:
-                where = f"for this machine, once, for up to a minute; later runs take it from {CACHE}"
-            print(f"pivoting: compiling {where}", file=sys.stderr, flush=True)
+                interrupt.compiling(0)
+                self.said = self.said or _say_that_it_compiles()
 
         def on_end(self, ended: event.Event) -> None:
-            pass
+            interrupt.compiling(-1 if ended.kind == "numba:compiler_lock" else 0)
 
-    event.register("numba:run_pass", Told())
+    watch = Watch()
+    event.register("numba:compiler_lock", watch)
+    event.register("numba:run_pass", watch)
+
+
+def _say_that_it_compiles() -> bool:
+    from pivoting.controller.kernel import CACHE  # whatever compiles has imported it
+
+    if CACHE is None:
+        where = "in memory, in every run: no folder for a cache can be written to; NUMBA_CACHE_DIR sets one"
+    else:
+        where = f"for this machine, once, for up to a minute; later runs take it from {CACHE}"
+    print(f"pivoting: compiling {where}", file=sys.stderr, flush=True)
+    return True
 
 
 def _end_by_broken_pipe() -> NoReturn:

@@ -162,11 +162,7 @@ def run(
         if also.get("holds"):
             click.echo(f"what would hold it: {also['holds']['setting']} ({also['holds']['why']}; tried, it passes)")
         elif also:
-            click.echo(
-                "what would hold it was not found: "
-                + ("; ".join(finished.summary()["remedies"]) or "-")
-                + " were tried"
-            )
+            click.echo("what would hold it was not found; `remedies` in the summary lists what its figures suggest")
     for line in () if saved is None else saved.said:
         click.echo(line)  # under --json on stderr, as all else
     return 1 if finished.verdict == "fail" else 0

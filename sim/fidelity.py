@@ -65,6 +65,11 @@ class ContactRows(NamedTuple):
         """What has to be the same of all contacts."""
         return self.pyramidal, self.D, self.b, self.k, self.solimp, self.margin
 
+    @property
+    def regularisation(self) -> float:
+        """R of the normal row of a contact that just touches [1/kg]."""
+        return float(self.D[0] * self.softness(np.array(0.0)))
+
     def impedance(self, depth: Array) -> Array:
         """d (...) at depths (...) below the margin [m]."""
         low, high, width, middle, power = self.solimp
@@ -163,7 +168,7 @@ def _row(model: mujoco.MjModel, data: mujoco.MjData, contact: Any) -> ContactRow
 
 def _unknown(model: mujoco.MjModel, body: int) -> str:
     """What of the model leaves the rows, or the step, different from what is assumed here; "" if nothing does."""
-    opt, flags, off = model.opt, mujoco.mjtEnableBit, mujoco.mjtDisableBit
+    opt, flags = model.opt, mujoco.mjtEnableBit
     integrator = mujoco.mjtIntegrator(int(opt.integrator)).name.removeprefix("mjINT_")
     if integrator not in ("EULER", "IMPLICIT", "IMPLICITFAST"):
         return f"integrator {integrator.lower()}"
@@ -174,10 +179,9 @@ def _unknown(model: mujoco.MjModel, body: int) -> str:
     for flag in ("DIAGEXACT", "SPECULATIVE", "IPC", "SLEEP"):
         if int(opt.enableflags) & int(getattr(flags, f"mjENBL_{flag}")):
             return f"the flag {flag.lower()}"
-    dofs = slice(int(model.body_dofadr[body]), int(model.body_dofadr[body] + model.body_dofnum[body]))
-    explicit = integrator == "EULER" and int(opt.disableflags) & int(off.mjDSBL_EULERDAMP)
-    if np.any(model.dof_damping[dofs]) and not explicit and not int(opt.disableflags) & int(off.mjDSBL_DAMPER):
-        return "its joints' damping is integrated implicitly"
+    first = int(model.body_dofadr[body])
+    if np.any(model.dof_dampingpoly[first : first + int(model.body_dofnum[body])]):
+        return "its joints' damping is not linear"
     return ""
 
 
@@ -227,7 +231,15 @@ def held(rows: ContactRows, listed: Listed, at: Array, axes: Array) -> Held:
 
 
 @np.errstate(invalid="ignore", over="ignore")
-def drift(rows: ContactRows, of: Held, turning: Array, touching: Array, velocity: Array, omega: Array) -> Array:
+def drift(
+    rows: ContactRows,
+    of: Held,
+    turning: Array,
+    touching: Array,
+    velocity: Array,
+    omega: Array,
+    unseen: Array | None = None,
+) -> Array:
     """Predicted slip (W, N+1, K, 2) of K contacts along the table (t, o) [m]; nan from where it is unknown.
 
     Args:
@@ -235,6 +247,7 @@ def drift(rows: ContactRows, of: Held, turning: Array, touching: Array, velocity
         turning: (W, N+1, K, 3) from `stepped_point` to each point, or to the centre of what rolls, table axes [m].
         touching: (W, N+1, K, 3) likewise to where they touch.
         velocity, omega: (W, N+1, 3) of that point and of the turn, table axes [m/s, rad/s].
+        unseen: (W, N, K, 2) acceleration of what touches that the rows do not see [m/s^2].
 
     An end of an edge that no row holds for a few steps, while the other is held, moves on as the body's acceleration
     makes it: MuJoCo gives a short edge of a mesh one contact, at one end and the other in turn.
@@ -252,6 +265,8 @@ def drift(rows: ContactRows, of: Held, turning: Array, touching: Array, velocity
         left, added = 1.0 - bh, (1.0 - bh) * above - h * of.give - below
     else:  # settled within a step, and beyond what a row's own recursion could follow
         left, added = 0.0, (turns / h - of.give) / rows.b - turns - below
+    if unseen is not None:
+        added = added + h * unseen * (1.0 if bh <= 2.0 else 1.0 / bh)
     kept, added = np.where(free, 1.0, left), np.where(free, gains[..., :2], added)
     speed = (velocity[:, 0, None] + np.cross(omega[:, 0, None], touching[:, 0]))[..., :2]
     path = np.zeros((added.shape[0], added.shape[1] + 1, *added.shape[2:]))

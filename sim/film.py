@@ -116,10 +116,25 @@ class Film:
         return body_solids(self.model, self.run.truth)
 
     @cached_property
+    def block(self) -> bool:
+        """Whether it is the planar scenes' block: one box about its CoM, whose depth says nothing."""
+        if self.dim == 3 or len(self.solids) != 1:
+            return False
+        far = np.abs(self.solids[0].vertices)
+        return bool(np.allclose(far, far.max(axis=0)))
+
+    @cached_property
     def side(self) -> float:
-        """Side of the block, the longest of a body in space [m]."""
-        points = [self.run.points] if self.dim == 2 else [solid.vertices for solid in self.solids]
-        return 2.0 * float(np.abs(np.concatenate(points)).max())
+        """Side of the block, the longest of any other body, in the plane that it moves in [m]."""
+        points = np.abs(np.concatenate([solid.vertices for solid in self.solids]))
+        return 2.0 * float((points[:, [0, 2]] if self.dim == 2 else points).max())
+
+    @cached_property
+    def depth(self) -> float:
+        """From the plane of motion to the nearest face of the block, as it is drawn [m]."""
+        if self.block:
+            return 0.5 * DEPTH * self.side
+        return float(np.abs(np.concatenate([solid.vertices for solid in self.solids])[:, 1]).max())
 
     @property
     def length(self) -> float:
@@ -144,7 +159,7 @@ class Film:
     @property
     def front(self) -> Array:
         """(3,) from the plane of motion to the one before the block that arrows are drawn in; nothing in space [m]."""
-        return -self.away * (0.5 * DEPTH + 0.02) * self.side * (self.dim == 2)
+        return -self.away * (self.depth + 0.02 * self.side) * (self.dim == 2)
 
     @property
     def weight(self) -> Array:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.solution import STATUS
 from pivoting.sim.fidelity import drift, why_unknown
+from pivoting.sim.implicit_step import unseen
 
 if TYPE_CHECKING:
     from pivoting.sim.run import Run
@@ -106,11 +107,9 @@ def predicted_slip(run: "Run") -> Array:
     """
     if run.contact_rows is None:
         return np.full(run.slip.shape, np.nan)
-    point = run.stepped
-    omega = run.angular_velocity @ run.table_axes
-    velocity = run.velocity @ run.table_axes + np.cross(omega, point)
-    turning, touching = run.turning - point[..., None, :], run.lever - point[..., None, :]
-    return drift(run.contact_rows, run.held, turning, touching, velocity, omega)
+    point, omega = run.stepped[..., None, :], run.angular_velocity @ run.table_axes
+    turning, touching = run.turning - point, run.lever - point
+    return drift(run.contact_rows, run.held, turning, touching, run.stepped_velocity, omega, unseen(run))
 
 
 def slip_floor_unknown(run: "Run") -> str:

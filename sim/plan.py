@@ -19,6 +19,7 @@ from pivoting.sim.relative import Load, load
 from pivoting.sim.scenario import Scenario
 
 Array = NDArray[np.float64]
+ANY = Load(1e-6, 1.0, 1e-6)  # so small that nothing that is relative to it is too large
 SAMPLES = 2001  # of a motion, to see how far it goes
 
 
@@ -94,10 +95,8 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
     table, gap = matrix(body.table), np.deg2rad(LOWEST)
     data = initial_data(model)
     now = data.xmat[body.index].reshape(3, 3)
-    contact = case.contact
-    if not isinstance(contact, str):
-        contact = _in_body_frame(contact, file_frame(model, body.index))
     origin, axes = file_frame(model, body.index)
+    contact = case.contact if isinstance(case.contact, str) else _in_body_frame(case.contact, (origin, axes))
     found = stance(
         model,
         body.index,
@@ -122,7 +121,13 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
 
 
 def _arc(case: Scenario) -> Arc | None:
-    """The angles of the scenario's motion, first that at which it begins; None if it gives no angles."""
+    """The angles of the scenario's motion, first that at which it begins; None if it gives no angles.
+
+    How long it takes may be relative to where it turns, which is not yet known: that changes no angle.
+    """
+    if not isinstance(case.reference, str) and isinstance(case.seconds, str):
+        return None
+    case = case.absolute(ANY)
     time = np.linspace(0.0, case.duration, SAMPLES)
     angle = np.array(case.motion(time)[0], dtype=float)
     if angle.shape != time.shape or not np.isfinite(angle).all():

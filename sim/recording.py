@@ -28,7 +28,7 @@ from pivoting.controller.solution import STATUS
 from pivoting.controller.solution_space import SolutionSpace
 from pivoting.controller.validate import fail
 from pivoting.sim.control import BOUNDED, FAILED, INACCURATE
-from pivoting.sim.film import DEPTH, PLOTS, SCENE, UP, Array, Colour, Film, Rows, usual, xyzw
+from pivoting.sim.film import PLOTS, SCENE, UP, Array, Colour, Film, Rows, usual, xyzw
 from pivoting.sim.identity import digest
 from pivoting.sim.monitor import predicted_slip
 from pivoting.sim.run import Run
@@ -44,6 +44,7 @@ ORANGE, YELLOW = (255, 150, 40), (250, 215, 90)  # predicted contact force: all 
 RED, PINK = (225, 60, 70), (250, 150, 170)  # measured, likewise
 PURPLE, GREY, WHITE = (165, 130, 235), (170, 170, 170), (235, 235, 235)  # planned cone; the world's, weight; the rest
 BLOCK, EDGES, TABLE, DARK = (70, 105, 145), (150, 185, 225), (120, 112, 100), (24, 26, 30)
+CROWDED = 2  # contacts: the legend of more would cover their plots
 LACKING = {  # status of an answer that does not give what is required -> what is said of that
     BOUNDED: "bounded: lacking",
     INACCURATE: "inaccurate: lacking",
@@ -141,14 +142,15 @@ def _solids(film: Film) -> None:
     pose = rr.Transform3D(translation=run.truth.origin, quaternion=xyzw(run.truth.table))
     top = rr.Boxes3D(centers=[at - slab * UP], half_sizes=[slab], colors=[TABLE], fill_mode="solid")
     film.still("world/table", pose, top)
-    if film.dim == 2:
-        half = np.abs(run.points[0]) + 0.5 * DEPTH * side * np.array([0.0, 1.0, 0.0])
+    vertices, normals, lines = (np.concatenate(parts) for parts in zip(*film.solids, strict=True))
+    if film.block:
+        half = np.array([1.0, 0.0, 1.0]) * np.abs(vertices).max(axis=0) + [0.0, film.depth, 0.0]
         film.still("world/block/solid", rr.Boxes3D(half_sizes=[half], colors=[BLOCK], fill_mode="solid"))
         film.still("world/block/edges", rr.Boxes3D(half_sizes=[half], colors=[EDGES], radii=thin))
     else:
-        vertices, normals, lines = (np.concatenate(parts) for parts in zip(*film.solids, strict=True))
-        glass = rr.Mesh3D(vertex_positions=vertices, vertex_normals=normals, albedo_factor=(*BLOCK, 60))
-        film.still("world/block/solid", glass)
+        colour = BLOCK if film.dim == 2 else (*BLOCK, 60)
+        solid = rr.Mesh3D(vertex_positions=vertices, vertex_normals=normals, albedo_factor=colour)
+        film.still("world/block/solid", solid)
         film.still("world/block/edges", rr.LineStrips3D(lines, colors=[EDGES], radii=thin))
     rows = film.rows(film.states, SCENE)
     position, quaternion = run.position[film.world, rows], run.quaternion[film.world, rows]
@@ -307,6 +309,8 @@ def _report(film: Film) -> str:
     lines += ["", f"Green: applied w. Orange: contact force f predicted, red: measured. {1e3 * film.scale:.3g} mm / N."]
     if film.dim == 3:
         lines += [f"Teal: its moment, {1e3 * film.scale / film.length:.3g} mm / (N m)."]
+    if len(film.tags) > 1:
+        lines += ["Of several contacts the first has the brightest lines; thick: measured, thin: predicted or planned."]
     return "\n".join(lines)
 
 
@@ -319,10 +323,13 @@ def _blueprint(film: Film, plots: list[str]) -> Any:
         return rrb.Spatial3DView(origin=origin, name=name, eye_controls=eyes, background=DARK, line_grid=False)
 
     eye = film.centre + film.side * np.array(EYE[film.dim]) @ np.array([np.cross(film.away, UP), -film.away, UP])
-    lines = [
-        rrb.TimeSeriesView(origin=f"plots/{name}", name=TITLES[name][0], plot_legend=rrb.PlotLegend(TITLES[name][1]))
-        for name in plots
-    ]
+    lines = []
+    for name in plots:
+        title, corner = TITLES[name]
+        if name == "slip" and film.dim == 3:
+            title = "size of the contact slip [mm]"
+        legend = rrb.PlotLegend(corner, visible=len(film.tags) <= CROWDED)
+        lines.append(rrb.TimeSeriesView(origin=f"plots/{name}", name=title, plot_legend=legend))
     if film.dim == 2:
         around, middle = film.reach * np.array([[0.35, 1.9, 1.2], [0.15, 0.15, 0.0]])
         second = view("wrench_space", "wrench space, object axes", around, middle)

@@ -202,6 +202,12 @@ class Run:
         return frozen(self._from_com(point[None] @ matrix(self.truth.axes))[..., 0, :])
 
     @cached_property
+    def stepped_velocity(self) -> Array:
+        """(W, N+1, 3) of that point, table axes [m/s]."""
+        omega = self.angular_velocity @ self.table_axes
+        return frozen(self.velocity @ self.table_axes + np.cross(omega, self.stepped))
+
+    @cached_property
     def corner(self) -> Array:
         """(W, N+1, K, 3) where the contacts touch, from the table's origin, table axes [m]."""
         return frozen(self._com[..., None, :] + self.lever)

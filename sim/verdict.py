@@ -1,6 +1,6 @@
 """The verdict: explicit thresholds on what was measured, and assertions on them for anyone's tests."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from pivoting.sim.run import Run
 
 FALL = 0.01  # [s]
+TRACKING = ("angle_error_rms_deg", "angle_error_max_deg")  # checks of the angle; the others are of contact and force
 
 
 @dataclass(frozen=True)
@@ -130,28 +131,44 @@ def worst_world(run: "Run") -> int:
     return int(np.argmax(ratios))
 
 
-def assert_sticking(run: "Run", *, slip_m: float | None = None, contact_lost_s: float | None = None) -> None:
-    """Fail unless the contact stuck in every world: slip, time without contact, friction use and force as predicted.
+def assert_sticking(
+    run: "Run",
+    *,
+    slip_m: float | None = None,
+    contact_lost_s: float | None = None,
+    undeclared_contact_s: float | None = None,
+    penetration_rel: float | None = None,
+    friction_use: float | None = None,
+    force_mismatch_rel: float | None = None,
+    bounce_m: float | None = None,
+) -> None:
+    """Fail unless the contact stuck in every world, nothing else touched, and the force was as predicted.
 
     Args:
         run: of `simulate`.
-        slip_m, contact_lost_s: limits in place of the scenario's own.
+        slip_m, ...: limits in place of the scenario's own, see `Limits`.
 
     Raises:
         AssertionError: it names the check, the worst world, its value, the limit, and the slip that is the simulator's
             own.
+        ValueError: a limit is not a number >= 0.
     """
-    limits = run.limits
-    over: dict[str, float | None] = {
-        "slip_max_m": limits.slip_m if slip_m is None else slip_m,
-        "contact_lost_s": limits.contact_lost_s if contact_lost_s is None else contact_lost_s,
-        "undeclared_contact_s": limits.undeclared_contact_s,
-        "penetration_rel": limits.penetration_rel,
-        "friction_use_max": limits.friction_use,
-        "force_mismatch_rel": limits.force_mismatch_rel,
+    given = {
+        "slip_m": slip_m,
+        "contact_lost_s": contact_lost_s,
+        "undeclared_contact_s": undeclared_contact_s,
+        "penetration_rel": penetration_rel,
+        "friction_use": friction_use,
+        "force_mismatch_rel": force_mismatch_rel,
+        "bounce_m": bounce_m,
     }
     floor = float(np.max(run.measures.slip_floor_m))
-    _assert_below(run, over, f" (the simulator itself: slip_floor_m = {floor:.3g})")
+    _assert_below(
+        run,
+        given,
+        lambda name: name not in (*TRACKING, "unsolved_steps"),
+        f" (the simulator itself: slip_floor_m = {floor:.3g})",
+    )
 
 
 def assert_tracking(run: "Run", *, rms_deg: float | None = None, max_deg: float | None = None) -> None:
@@ -163,22 +180,19 @@ def assert_tracking(run: "Run", *, rms_deg: float | None = None, max_deg: float 
 
     Raises:
         AssertionError: it names the check, the worst world, its value and the limit.
+        ValueError: a limit is not a number >= 0.
     """
-    limits = run.limits
-    over: dict[str, float | None] = {
-        "angle_error_rms_deg": limits.angle_rms_deg if rms_deg is None else rms_deg,
-        "angle_error_max_deg": limits.angle_max_deg if max_deg is None else max_deg,
-    }
-    _assert_below(run, over, "")
+    _assert_below(run, {"angle_rms_deg": rms_deg, "angle_max_deg": max_deg}, TRACKING.__contains__, "")
 
 
-def _assert_below(run: "Run", over: dict[str, float | None], context: str) -> None:
+def _assert_below(run: "Run", given: Mapping[str, float | None], asked: Callable[[str], bool], context: str) -> None:
+    """Of the checks whose name is asked for, within the limits that are given or else the run's own."""
+    limits = run.limits.change({name: value for name, value in given.items() if value is not None})
     wrong = []
-    for name, limit in over.items():
-        assert limit is not None
-        values = np.atleast_1d(getattr(run.measures, name))
-        if not (values <= limit).all():
+    for check in judge(run.measures, limits):
+        if asked(check.name) and not check.passed:
+            values = np.atleast_1d(getattr(run.measures, check.name))
             world = int(np.argmax(np.where(np.isfinite(values), values, np.inf)))
-            wrong.append(f"{name} = {values[world]:.4g} > {limit:.4g} in world {world}")
+            wrong.append(f"{check.name} = {values[world]:.4g} > {check.limit:.4g} in world {world}")
     if wrong:
         raise AssertionError(f"{run.scenario.name}: " + "; ".join(wrong) + context)

@@ -48,3 +48,48 @@ def test_assertions_take_limits_of_ones_own(shipped: Callable[[str], Run]) -> No
         assert_tracking(run, rms_deg=1e-6)
     with pytest.raises(AssertionError, match="angle_error_max_deg"):
         assert_tracking(run, max_deg=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("limit", "name"),
+    [
+        ("slip_m", "slip_max_m"),
+        ("contact_lost_s", "contact_lost_s"),
+        ("undeclared_contact_s", "undeclared_contact_s"),
+        ("penetration_rel", "penetration_rel"),
+        ("friction_use", "friction_use_max"),
+        ("force_mismatch_rel", "force_mismatch_rel"),
+    ],
+)
+def test_every_limit_of_sticking_is_an_argument(shipped: Callable[[str], Run], limit: str, name: str) -> None:
+    run = replace(shipped("snap-2d"))
+    vars(run)["measures"] = replace(run.measures, **{name: np.array([0.01])})
+    assert_sticking(run, **{limit: 0.0101})
+    with pytest.raises(AssertionError, match=rf"^snap-2d: {name} = 0.01 > 0.0099 in world 0 \(the simulator itself"):
+        assert_sticking(run, **{limit: 0.0099})
+    with pytest.raises(ValueError, match=f"limits.{limit} = -1.0"):
+        assert_sticking(run, **{limit: -1.0})
+
+
+def test_limits_of_a_landing(shipped: Callable[[str], Run]) -> None:
+    run = shipped("settle-3d")
+    bounce = float(run.measures.bounce_m[0])
+    assert_sticking(run, bounce_m=1.01 * bounce + 1e-12)
+    missing = replace(run)
+    vars(missing)["measures"] = replace(run.measures, contacts_missing=np.array([1.0]))
+    with pytest.raises(AssertionError, match="contacts_missing = 1 > 0"):
+        assert_sticking(missing)
+
+
+def test_limits_may_be_given_as_a_mapping_or_text() -> None:
+    limits = Limits(slip_m=1e-4, settle_s=0.2)
+    assert limits.change({"slip_m": "2e-3"}) == Limits(slip_m=2e-3, settle_s=0.2)
+    assert limits.change(Limits()) == Limits()
+    for wrong, message in (
+        ({"slip": 1.0}, "limits.slip = 1.0: must be a known limit: slip_m"),
+        ({"slip_m": "x"}, "limits.slip_m = 'x': must be a number"),
+        ({"slip_m": -1}, "limits.slip_m = -1.0: must be"),
+        (3, "limits = 3: must be Limits, or a mapping"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            limits.change(wrong)  # type: ignore[arg-type]
