@@ -37,6 +37,8 @@ def console() -> "Console":
     from rich.console import Console
 
     class Page(Console):
+        """It leaves a broken pipe to the process."""
+
         def on_broken_pipe(self) -> NoReturn:
             raise
 
