@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pivoting.models.hull import colliding, ellipsoids
-from pivoting.models.naming import ModelError, geom_id, label
+from pivoting.models.naming import ModelError, body_name, geom_id, label
 
 Array = NDArray[np.float64]
 RAYS = 64  # at most, cast down from the lowest points of the body
@@ -95,7 +95,7 @@ def find_support(model: mujoco.MjModel, data: mujoco.MjData, body: int, named: s
     """
     if named is not None:
         return geom_id(model, named)
-    name = model.body(body).name
+    name = body_name(model, body)
     own = colliding(model, body)
     if not own:
         raise ModelError(f"body = {name!r}: it has no colliding geom; must have one with contype, conaffinity or pair")
