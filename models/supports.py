@@ -56,7 +56,7 @@ def support_surface(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Su
     """
     if model.body_weldid[model.geom_bodyid[geom]] != 0:
         raise ModelError(
-            f"support = {label(model, geom)}: it can move; must be fixed to the world; name another --support"
+            f"support = {label(model, geom)}: it can move; must be fixed; name another --support"
         )
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
     R, up = data.geom_xmat[geom].reshape(3, 3), upward(model)
