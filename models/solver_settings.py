@@ -48,13 +48,10 @@ def choose(spec: mujoco.MjSpec, ours: mujoco.MjSpec, parts: list[Any]) -> dict[s
             replaced[name] = " and ".join(", ".join(f"{x:g}" for x in old) for old in sorted(olds))
         for part in parts:
             setattr(part, name, new)
-    pairs = [part for part in parts if isinstance(part, mujoco.MjsPair)]
-    if any(np.any(pair.solreffriction) for pair in pairs):
-        replaced["solreffriction"] = " and ".join(
-            ", ".join(f"{x:g}" for x in pair.solreffriction[:2]) for pair in pairs if np.any(pair.solreffriction)
-        )
-    for pair in pairs:  # 0: as solref
-        pair.solreffriction = np.zeros(len(pair.solreffriction))
+    for part in parts:
+        if isinstance(part, mujoco.MjsPair) and np.any(part.solreffriction):
+            replaced["solreffriction"] = ", ".join(f"{x:g}" for x in part.solreffriction)
+            part.solreffriction = 0.0, 0.0  # friction rows as the normal ones
     solrefs = {tuple(np.asarray(part.solref)[:2].tolist()) for part in parts}
     replaced["solref"] = " and ".join(", ".join(f"{x:g}" for x in old) for old in sorted(solrefs))
     spec.option.o_solimp, spec.option.o_margin = ours.default.geom.solimp, 0.0

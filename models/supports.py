@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pivoting.models.hull import colliding, ellipsoids
-from pivoting.models.naming import ModelError, geom_id, label
+from pivoting.models.naming import ModelError, body_name, geom_id, label
 from pivoting.models.under import first_met
 
 Array = NDArray[np.float64]
@@ -55,9 +55,7 @@ def support_surface(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Su
         ModelError: the geom is no plane, box or upright cylinder, or it can move.
     """
     if model.body_weldid[model.geom_bodyid[geom]] != 0:
-        raise ModelError(
-            f"support = {label(model, geom)}: it can move; must be fixed; name another --support"
-        )
+        raise ModelError(f"support = {label(model, geom)}: it can move; must be fixed; name another --support")
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
     R, up = data.geom_xmat[geom].reshape(3, 3), upward(model)
     if kind == PLANE:
@@ -93,7 +91,7 @@ def find_support(model: mujoco.MjModel, data: mujoco.MjData, body: int, named: s
     """
     if named is not None:
         return geom_id(model, named)
-    name = model.body(body).name
+    name = body_name(model, body)
     own = colliding(model, body)
     if not own:
         raise ModelError(f"body = {name!r}: it has no colliding geom; must have one with contype, conaffinity or pair")

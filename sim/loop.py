@@ -17,7 +17,7 @@ from pivoting.models.contact_settings import contact_settings
 from pivoting.models.frames import matrix
 from pivoting.models.friction import read_friction
 from pivoting.models.given import NEAR
-from pivoting.models.naming import ModelError
+from pivoting.models.naming import ModelError, body_id, geom_id
 from pivoting.models.reading import initial_data, place, read_body, turn
 from pivoting.models.scenes import Scene, load
 from pivoting.models.sensors import instrument
@@ -260,6 +260,8 @@ def believe(
     nominal = believed.compile()
     case = replace(case, body=believed.body, support=believed.support)
     plan = planned(case, nominal, read.unit)
+    if case.chosen and case.mu is None:  # what the file itself says of friction holds: it may have none
+        read_friction(read.read, body_id(read.read, read.body), geom_id(read.read, read.support), plan.contacts)
     if controller is not None:
         _check(controller, case, plan)
     if plan.load.force == 0.0 and (case.f_min if controller is None else controller.belief.f_min.max()) == 0.0:
