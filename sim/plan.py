@@ -13,6 +13,7 @@ from pivoting.models.given import NEAR
 from pivoting.models.grip import grip
 from pivoting.models.naming import ModelError, label
 from pivoting.models.reading import RigidBody, file_frame, initial_data, read_body
+from pivoting.models.supports import body_size
 from pivoting.models.tilt import Arc
 from pivoting.sim.keys import LOWEST
 from pivoting.sim.relative import Load, load
@@ -63,13 +64,20 @@ def planned(case: Scenario, model: mujoco.MjModel, unit: float = 1.0) -> Plan:
         ModelError: the model cannot be served, or the object cannot be pivoted on that contact; with the reason.
     """
     body = read_body(model, case.body, case.support)
+    size = body_size(model, body.index)
+    _refuse_beside(model, body, initial_data(model).xipos[body.index], size, "its centre of mass", unit)
     found = _planar(case, model, body) if body.dim == 2 else _spatial(case, model, body)
     held = (found.contacts - found.contacts[0]) @ (matrix(found.start) @ matrix(body.axes).T).T
-    over = float(body.surface.beyond(found.at + held).max())
-    if over > NEAR * float(np.linalg.norm(found.contacts[0] - body.com)):
-        told = f"the contact would be {over * unit:.3g} m beside its upper face"
-        raise ModelError(f"support = {label(model, body.support)}: {told}; must be under the body")
+    _refuse_beside(model, body, found.at + held, NEAR * size, "the contact", unit)
     return replace(found, unit=unit)
+
+
+def _refuse_beside(model: mujoco.MjModel, body: RigidBody, at: Array, allowed: float, what: str, unit: float) -> None:
+    """A point (3,) of the body has to be above the face that it stands on."""
+    over = float(body.surface.beyond(at).max())
+    if over > allowed:
+        told = f"{what} would be {over * unit:.3g} m beside its upper face"
+        raise ModelError(f"support = {label(model, body.support)}: {told}; must be under the body")
 
 
 def transplanted(plan: Plan, model: mujoco.MjModel, body: RigidBody, grown: float) -> Plan:
