@@ -17,7 +17,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 MEMORY = (
-    "pivoting: compiling in memory, in every run: no folder for a cache can be written to, NUMBA_CACHE_DIR names one"
+    "pivoting: compiling in memory, in every run: no folder for a cache can be written to; NUMBA_CACHE_DIR sets one"
 )
 
 
