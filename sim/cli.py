@@ -98,11 +98,11 @@ class _RunCommand(click.Command):
 )
 @click.option("--limit", "limits", multiple=True, metavar="KEY=VALUE", help="Change a limit of the verdict.")
 @click.option("--model", type=click.Path(path_type=Path), help="An MJCF file of your own, for the scenario pivot.")
-@click.option("--body", help="Name of the body in it that is pivoted.")
+@click.option("--body", help="Name of the body in it that is pivoted, or '#1' of one without a name.")
 @click.option(
     "--contact", help='What it turns about: vertex, edge, lowest, or "x,y,z" or "x,y,z; x,y,z" in its frame, m.'
 )
-@click.option("--support", help="Name of the plane or box geom that it stands on; by default the only plane.")
+@click.option("--support", help="Name (or '#id') of the geom that it stands on; by default what is under it.")
 @click.option("--as-modelled", is_flag=True, help="Keep the file's contact and solver parameters.")
 @click.option("--open-loop", is_flag=True, help="Plan the whole motion once and apply that, whatever happens.")
 @click.option("--out", type=click.Path(), help="Folder for SCENARIO.rrd, SCENARIO.summary.json and summary.json.")

@@ -102,7 +102,9 @@ def list_contacts(sensed: Array, at: Array, declared: Declared) -> Listed:
         sensed: (N, W, S 14).
         at: (N, W, K, 3) where the declared contacts are [world axes, m].
     """
-    contacts = sensed.reshape(*sensed.shape[:2], -1, FIELDS)
+    slots = sensed.reshape(*sensed.shape[:2], -1, FIELDS)
+    used = np.flatnonzero((slots[..., 0] > 0.0).any(axis=(0, 1)))
+    contacts = np.ascontiguousarray(slots[:, :, : 1 + used.max(initial=0)])  # most slots are empty throughout
     there = contacts[..., 0] > 0.0
     share, away = declared.shares(contacts[..., 5:8], at)
     return Listed(
