@@ -13,7 +13,7 @@ from pivoting.sim.stdout import JsonOutput, console, json_option
 if TYPE_CHECKING:
     from pivoting.sim.scenario import Scenario
 
-# MuJoCo, numba and rerun are imported by the commands that need them: `pivoting --help` answers at once.
+# What one command alone needs, as rerun and matplotlib, is imported by that.
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
