@@ -61,7 +61,8 @@ def _of_the_surroundings(model: mujoco.MjModel, body: int, support: int) -> Iter
     opt = model.opt
     if opt.density > 0.0 or opt.viscosity > 0.0:
         wind = f", wind = {np.array(opt.wind).tolist()}" if np.any(opt.wind) else ""
-        yield f"a fluid acts on it (density = {opt.density:g}, viscosity = {opt.viscosity:g}{wind})"
+        out = '<option density="0" viscosity="0"/> takes it away'
+        yield f"a fluid acts on it (density = {opt.density:g}, viscosity = {opt.viscosity:g}{wind}; {out})"
     if model.body_gravcomp[body] != 0.0:
         yield f"it has gravcomp = {model.body_gravcomp[body]:g}"
     own = range(int(model.body_geomadr[body]), int(model.body_geomadr[body] + model.body_geomnum[body]))

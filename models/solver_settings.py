@@ -67,8 +67,8 @@ def _word(name: str, value: Any) -> str:
 
 
 def _anisotropy(spec: mujoco.MjSpec, parts: list[Any]) -> float:
-    """The greatest squared ratio of both tangents' friction: MuJoCo makes the weaker one as many times as soft."""
+    """How many times softer than the first tangent the softer one is: MuJoCo divides by the friction's square."""
     frictions = [part.friction[:2] for part in parts if isinstance(part, mujoco.MjsPair)]
     if spec.option.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
         frictions.append(spec.option.o_friction[:2])
-    return max((float(np.max(both) / max(np.min(both), 1e-5)) ** 2 for both in frictions), default=1.0)
+    return max((float(both[0] / max(np.min(both), 1e-5)) ** 2 for both in frictions), default=1.0)

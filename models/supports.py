@@ -63,7 +63,12 @@ def support_surface(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Su
         return Surface(geom, np.array(R), np.array(data.geom_xpos[geom]), np.full(2, np.inf), False)
     k = int(np.abs(R.T @ up).argmax())
     if kind not in (BOX, CYLINDER) or (kind == CYLINDER and k != 2):
-        raise ModelError(f"support = {label(model, geom)}: must be a plane, a box or an upright cylinder")
+        kind_word = mujoco.mjtGeom(kind).name.removeprefix("mjGEOM_").lower()
+        told = f"a {kind_word} has no flat face that is known" if kind != CYLINDER else "the cylinder lies on its side"
+        out = "give the model a box with its upper face there, or name another --support"
+        raise ModelError(
+            f"support = {label(model, geom)}: {told}; must be a plane, a box or an upright cylinder: {out}"
+        )
     n, t = R[:, k] * (1.0 if R[:, k] @ up >= 0.0 else -1.0), R[:, (k + 1) % 3]
     thick = size[1] if kind == CYLINDER else size[k]
     half = np.full(2, size[0]) if kind == CYLINDER else size[[(k + 1) % 3, (k + 2) % 3]]

@@ -80,13 +80,12 @@ class _Case:
     @property
     def least_push(self) -> float:
         """[N] the least normal force of a contact that the answers count on."""
-        return float(np.nanmin(self.run.force[self.world, :, :, -1], initial=np.inf))
+        return self.run.unit * float(np.nanmin(self.run.force[self.world, :, :, -1], initial=np.inf))
 
     @property
     def weight(self) -> float:
         """[N] as believed."""
-        body = self.run.attached.body
-        return body.mass * float(np.linalg.norm(body.gravity))
+        return self.run.load.force
 
     @property
     def mu(self) -> float:
@@ -188,7 +187,7 @@ def _floors(case: _Case) -> Iterator[float]:
     run, i = case.run, case.world
     K = len(run.points)
     off = np.linalg.norm(run.force_measured[i] - run.force[i], axis=-1)
-    error = float(np.quantile(np.nan_to_num(off), 0.95))
+    error = run.unit * float(np.quantile(np.nan_to_num(off), 0.95))
     spare = max(run.mu_world - float(np.max(run.attached.controller.belief.mu)), 0.1 * run.mu_world)
     some = {0.5 * case.weight / K, 2.0 * case.weight / K, 5.0 * case.weight / K}
     rows = run.contact_rows
@@ -197,9 +196,9 @@ def _floors(case: _Case) -> Iterator[float]:
         w = run.angular_velocity[i] @ run.table_axes
         c_n = float(np.nanmax(np.abs(np.cross(w[:, None], np.cross(w[:, None], run.turning[i]))[..., 2]), initial=0.0))
         opening = c_n * max(1.0 - 0.5 * rows.b * rows.h, 0.0) / rows.regularisation * rows.points / K
-        some |= {2.0 * opening}
+        some |= {2.0 * run.unit * opening}
     some |= {1.5 * error * (1.0 + run.mu_world) / spare}
-    least = max(1.2 * float(run.attached.controller.belief.f_min.min()), 0.05 * case.weight / K)
+    least = max(1.2 * run.unit * float(run.attached.controller.belief.f_min.min()), 0.05 * case.weight / K)
     yield from sorted({_up(floor) for floor in some if least < floor < most})
 
 

@@ -21,6 +21,8 @@ BOUNDED = STATUS.index("bounded")
 class Measures:
     """One value for each world, (W,); slip over the whole run, everything else after the scenario's `settle_s`.
 
+    In the unit that the name ends with, whatever the model's unit of length is.
+
     Attributes:
         slip_max_m: greatest displacement of a contact along the table from where it started, less what it rolled.
         slip_floor_m: what the simulator's creep, rotation and penetration terms predict for it (`fidelity.drift`); nan
@@ -68,15 +70,15 @@ def measure(run: "Run") -> Measures:
     mismatch = _rms(np.linalg.norm(measured - predicted, axis=-1)) / _rms(np.linalg.norm(predicted, axis=-1))
     ever = pushed.any(axis=(1, 2))
     return Measures(
-        slip_max_m=np.linalg.norm(run.slip, axis=-1).max(axis=(1, 2)),
-        slip_floor_m=np.linalg.norm(predicted_slip(run), axis=-1).max(axis=(1, 2)),
+        slip_max_m=run.unit * np.linalg.norm(run.slip, axis=-1).max(axis=(1, 2)),
+        slip_floor_m=run.unit * np.linalg.norm(predicted_slip(run), axis=-1).max(axis=(1, 2)),
         angle_error_rms_deg=_rms(error),
         angle_error_max_deg=np.abs(error).max(axis=1),
         contact_lost_s=np.count_nonzero(lost, axis=1) * run.dt,
         undeclared_contact_s=np.count_nonzero(run.contacts.strays > 0.0, axis=1) * run.dt,
         penetration_rel=_penetration(run) / run.size,
         contacts_missing=np.maximum(run.scenario.limits.contacts_end - run.contacts_found[:, -1], 0.0),
-        bounce_m=_bounce(run),
+        bounce_m=run.unit * _bounce(run),
         friction_use_max=np.where(ever, np.where(pushed, use, 0.0).max(axis=(1, 2)), np.nan),
         force_mismatch_rel=mismatch,
         residual_max=np.where(np.isfinite(run.residual), run.residual, np.inf).max(axis=1),

@@ -36,6 +36,7 @@ class Plan:
         start: (4,) orientation at angle 0, object axes to world.
         range: the angles [rad] at which nothing else touches the support.
         face: (P, 3) the corners that touch as well at angle 0, body frame [m].
+        unit: of the model's lengths [m]; all the above is in it.
     """
 
     body: RigidBody
@@ -46,16 +47,17 @@ class Plan:
     start: Array
     range: tuple[float, float]
     face: Array
+    unit: float = 1.0
 
     @property
     def load(self) -> Load:
-        """What values of the scenario may be relative to."""
+        """What values of the scenario may be relative to, in N, m and s."""
         points = np.array([self.body.point(contact) for contact in self.contacts])
-        return load(self.body.mass, self.body.gravity, points, self.radius)
+        return load(self.body.mass, self.unit * self.body.gravity, self.unit * points, self.unit * self.radius)
 
 
-def planned(case: Scenario, model: mujoco.MjModel) -> Plan:
-    """The scenario's plan on its compiled model, as the controller believes it.
+def planned(case: Scenario, model: mujoco.MjModel, unit: float = 1.0) -> Plan:
+    """The scenario's plan on its compiled model, whose lengths are in `unit` [m], as the controller believes it.
 
     Raises:
         ModelError: the model cannot be served, or the object cannot be pivoted on that contact; with the reason.
@@ -64,9 +66,9 @@ def planned(case: Scenario, model: mujoco.MjModel) -> Plan:
     found = _planar(case, model, body) if body.dim == 2 else _spatial(case, model, body)
     over = float(body.surface.beyond(found.at).max())
     if over > NEAR * float(np.linalg.norm(found.contacts[0] - body.com)):
-        told = f"the contact would be {over:.3g} m beside its upper face"
+        told = f"the contact would be {over * unit:.3g} m beside its upper face"
         raise ModelError(f"support = {label(model, body.support)}: {told}; must be under the body")
-    return found
+    return replace(found, unit=unit)
 
 
 def transplanted(plan: Plan, model: mujoco.MjModel, body: RigidBody, grown: float) -> Plan:

@@ -53,6 +53,7 @@ class Run:
         seed: of the worlds' initial errors.
         attached: the controller and what it believes.
         load: what the scenario's relative values are relative to.
+        unit: of the model's lengths [m], and with it of all lengths, forces and moments below.
         model: the world's, with the sensors of the loop.  truth: the body as that has it.
         replaced: what of the file gave way to the settings of the shipped scenes: name, and what it was.
         settings: contact parameters that were chosen for the object, if they were.
@@ -89,6 +90,7 @@ class Run:
     seed: int
     attached: Attached
     load: Load
+    unit: float
     model: mujoco.MjModel
     truth: RigidBody
     replaced: tuple[tuple[str, str], ...]
@@ -267,7 +269,9 @@ class Run:
     @property
     def limits(self) -> Limits:
         """Of the verdict, with that on the slip in metres."""
-        return self.scenario.limits.for_object(self.size, float(np.linalg.norm(self.truth.gravity)))
+        return self.scenario.limits.for_object(
+            self.unit * self.size, self.unit * float(np.linalg.norm(self.truth.gravity))
+        )
 
     @cached_property
     def strays(self) -> list[str]:
@@ -301,8 +305,9 @@ class Run:
             "scenario": self.scenario.name,
             "model": str(self.scenario.path),
             "body": self.scenario.body,
-            "contacts": self.points.tolist(),
-            "radius": self.radius.tolist(),
+            "length_unit_m": self.unit,
+            "contacts": (self.unit * self.points).tolist(),
+            "radius": (self.unit * self.radius).tolist(),
             "changes": self.scenario.changes,
             "resolved": self.scenario.resolved(self.load),
             "limits": asdict(self.limits),
@@ -339,11 +344,11 @@ class Run:
         return {
             "support": label(self.model, self.truth.support).strip("'"),
             "mass_kg": self.truth.mass,
-            "inertia_kg_m2": np.asarray(self.truth.inertia).tolist(),
-            "com_m": self.truth.com.tolist(),
+            "inertia_kg_m2": (self.unit**2 * np.asarray(self.truth.inertia)).tolist(),
+            "com_m": (self.unit * self.truth.com).tolist(),
             "mu": self.mu_world,
-            "contacts_m": (self.truth.com + self.points @ R.T).tolist(),
-            "radius_m": self.radius.tolist(),
+            "contacts_m": (self.unit * (self.truth.com + self.points @ R.T)).tolist(),
+            "radius_m": (self.unit * self.radius).tolist(),
             "damping": 0.0 if self.truth.drag is None else float(self.truth.drag.damping.max()),
             "frictionloss": 0.0 if self.truth.drag is None else float(self.truth.drag.friction.max()),
         }
