@@ -138,7 +138,7 @@ def _solid(model: mujoco.MjModel, indices: list[int]) -> bool:
 def scene(thing: Thing) -> Path:
     """An MJCF file with the object alone on a plane, beside its own file; its body is "object".
 
-    Its geoms, bodies and inertias are as in its own file, options are MuJoCo's defaults.
+    Its geoms, bodies and inertias are as in its own file; the free joint is a new one, options are MuJoCo's defaults.
 
     Raises:
         ValueError: MuJoCo does not compile it, or it is not what it was.
@@ -171,8 +171,9 @@ def scene(thing: Thing) -> Path:
         attached = world.worldbody.add_body()
         attached.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="mesh", density=1000.0)
     attached.name = "object"
-    if not attached.joints:
-        attached.add_freejoint()
+    for joint in [*attached.joints]:
+        world.delete(joint)
+    attached.add_freejoint()
     _strip(world)
     model = world.compile()
     if mass is not None and abs(model.body_subtreemass[1] - mass) > 1e-6 * mass:

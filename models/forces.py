@@ -6,7 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.models.naming import ModelError, label
+from pivoting.models.naming import ModelError, body_name, label
 
 Array = NDArray[np.float64]
 OBJ = mujoco.mjtObj
@@ -34,8 +34,9 @@ def refuse_unknown_forces(model: mujoco.MjModel, body: int, support: int) -> Non
     Raises:
         ModelError: something else acts on the body; it is named.
     """
-    name = model.body(body).name
-    for what in unknown_forces(model, body, support):
+    name = body_name(model, body)
+    what = "; ".join(unknown_forces(model, body, support))
+    if what:
         raise ModelError(f"body = {name!r}: {what}; the controller does not know of it: must be taken out of the model")
 
 
@@ -49,9 +50,9 @@ def unknown_forces(model: mujoco.MjModel, body: int, support: int) -> Iterator[s
     if not _off(model, "EQUALITY"):
         yield from _constraints(model, body, joints, tendons)
     if not _off(model, "ACTUATION"):
-        yield from _actuators(model, body, joints, tendons)
+        yield from _actuators(model, body, support, joints, tendons)
     for tendon in sorted(tendons):
-        attributes = ("stiffness", "damping", "frictionloss", "limited", "armature")
+        attributes = ("stiffness", "stiffnesspoly", "damping", "dampingpoly", "frictionloss", "limited", "armature")
         pulls = [key for key in attributes if np.any(getattr(model, f"tendon_{key}")[tendon])]
         if pulls:
             yield f"tendon {_called(model, OBJ.mjOBJ_TENDON, tendon)} pulls on it ({', '.join(pulls)})"
@@ -61,7 +62,8 @@ def _of_the_surroundings(model: mujoco.MjModel, body: int, support: int) -> Iter
     opt = model.opt
     if opt.density > 0.0 or opt.viscosity > 0.0:
         wind = f", wind = {np.array(opt.wind).tolist()}" if np.any(opt.wind) else ""
-        yield f"a fluid acts on it (density = {opt.density:g}, viscosity = {opt.viscosity:g}{wind})"
+        out = '<option density="0" viscosity="0"/> takes it away'
+        yield f"a fluid acts on it (density = {opt.density:g}, viscosity = {opt.viscosity:g}{wind}; {out})"
     if model.body_gravcomp[body] != 0.0:
         yield f"it has gravcomp = {model.body_gravcomp[body]:g}"
     own = range(int(model.body_geomadr[body]), int(model.body_geomadr[body] + model.body_geomnum[body]))
@@ -114,7 +116,7 @@ def _constraints(model: mujoco.MjModel, body: int, joints: set[int], tendons: se
             yield f"the equality constraint {_called(model, OBJ.mjOBJ_EQUALITY, eq)} ({kind}) holds it"
 
 
-def _actuators(model: mujoco.MjModel, body: int, joints: set[int], tendons: set[int]) -> Iterator[str]:
+def _actuators(model: mujoco.MjModel, body: int, support: int, joints: set[int], tendons: set[int]) -> Iterator[str]:
     kinds = mujoco.mjtTrn
     sites = set(np.flatnonzero(model.site_bodyid == body).tolist())
     what = {
@@ -123,7 +125,7 @@ def _actuators(model: mujoco.MjModel, body: int, joints: set[int], tendons: set[
         int(kinds.mjTRN_TENDON): tendons,
         int(kinds.mjTRN_SITE): sites,
         int(kinds.mjTRN_SLIDERCRANK): sites,
-        int(kinds.mjTRN_BODY): {body},
+        int(kinds.mjTRN_BODY): {body, int(model.geom_bodyid[support])},  # adhesion, of either
     }
     for actuator in range(len(model.actuator_trntype)):
         ends = {int(end) for end in np.ravel(model.actuator_trnid[actuator])}

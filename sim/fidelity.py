@@ -202,7 +202,7 @@ def held(rows: ContactRows, listed: Listed, at: Array, axes: Array) -> Held:
         axes: (3, 3) the table's (t, o, n) as columns, world axes.
     """
     push, pull = listed.local[..., 0], listed.local[..., 1:]
-    on = listed.share.any(axis=-1) & (push > 0.0)
+    pressed = listed.share.any(axis=-1) & (push > 0.0)
     use = np.abs(pull) / rows.mu
     if rows.pyramidal:
         lean = np.maximum(
@@ -215,6 +215,7 @@ def held(rows: ContactRows, listed: Listed, at: Array, axes: Array) -> Held:
     give = (local[..., :1] * listed.tangent + local[..., 1:] * np.cross(listed.normal, listed.tangent)) @ axes[:, :2]
     above = (listed.position - listed.share @ at) @ axes[:, 2]
     values = np.concatenate([give, above[..., None]], axis=-1)
+    on = pressed & ~slides
     weight = np.where(on[..., None], listed.share, 0.0)
     total, shared = (
         np.einsum("...sk,...sv->...kv", weight, values),
@@ -227,7 +228,7 @@ def held(rows: ContactRows, listed: Listed, at: Array, axes: Array) -> Held:
         count = alone.sum(axis=-2)[..., None]
         one = np.einsum("...sk,...sv->...kv", alone.astype(float), values) / np.where(count > 0, count, 1)
         out = np.where(firm[..., None, None], out, np.where(count > 0, one, np.nan))
-    return Held(out[..., :2], np.nan_to_num(out[..., 2]), (on & slides).any(axis=-1))
+    return Held(out[..., :2], np.nan_to_num(out[..., 2]), (pressed & slides).any(axis=-1))
 
 
 @np.errstate(invalid="ignore", over="ignore")
@@ -239,8 +240,13 @@ def drift(
     velocity: Array,
     omega: Array,
     unseen: Array | None = None,
+    settle: int = 0,
 ) -> Array:
     """Predicted slip (W, N+1, K, 2) of K contacts along the table (t, o) [m]; nan from where it is unknown.
+
+    What no row holds in a step moves on as the body's acceleration makes it, which the forces give. That is told of an
+    end of an edge, for a few steps while the other end is held (MuJoCo gives a short edge of a mesh one contact, at one
+    end and the other in turn), and of the start, where a contact that does not carry its load yet may slide.
 
     Args:
         of: (W, N) first.
@@ -248,9 +254,7 @@ def drift(
         touching: (W, N+1, K, 3) likewise to where they touch.
         velocity, omega: (W, N+1, 3) of that point and of the turn, table axes [m/s, rad/s].
         unseen: (W, N, K, 2) acceleration of what touches that the rows do not see [m/s^2].
-
-    An end of an edge that no row holds for a few steps, while the other is held, moves on as the body's acceleration
-    makes it: MuJoCo gives a short edge of a mesh one contact, at one end and the other in turn.
+        settle: steps that the start may take.
     """
     h, bh = rows.h, rows.b * rows.h
     after = omega[:, 1:, None]
@@ -274,19 +278,19 @@ def drift(
         path[:, step + 1] = kept[:, step] * speed + added[:, step]
         speed = path[:, step + 1] + turns[:, step]
     path[:, 1:] = np.cumsum(h * path[:, 1:] + beyond, axis=1)
-    path[:, 1:][np.logical_or.accumulate(_failure(of) > 0, axis=1)] = np.nan
+    path[:, 1:][np.logical_or.accumulate(_failure(of, settle) > 0, axis=1)] = np.nan
     return path if not rows.unknown else np.full_like(path, np.nan)
 
 
-def why_unknown(rows: ContactRows | None, of: Held, time: Array) -> list[str]:
+def why_unknown(rows: ContactRows | None, of: Held, time: Array, settle: int = 0) -> list[str]:
     """Of each world why its drift cannot be told, or "".
 
     Args:
-        of: (W, N) first.  time: (N+1,) [s].
+        of: (W, N) first.  time: (N+1,) [s].  settle: as for `drift`.
     """
     if rows is None:
         return ["it does not touch its support at the start"] * len(of.slides)
-    failure = _failure(of)
+    failure = _failure(of, settle)
     first = (failure > 0).argmax(axis=1)
     events = [(_FAILURES[int(row[step])], float(time[step])) for row, step in zip(failure, first, strict=True)]
     return [rows.unknown or (f"{what} at {when:.3g} s" if what else "") for what, when in events]
@@ -295,10 +299,11 @@ def why_unknown(rows: ContactRows | None, of: Held, time: Array) -> list[str]:
 _FAILURES = ("", "a contact slides", "no contact holds it", "an end of the edge is without contact")
 
 
-def _failure(of: Held) -> NDArray[np.int8]:
-    """(W, N) what of `_FAILURES` keeps the rows from telling the drift."""
+def _failure(of: Held, settle: int) -> NDArray[np.int8]:
+    """(W, N) what of `_FAILURES` keeps the rows from telling the drift, after the first steps."""
     free = np.isnan(of.give[..., 0])
     count = np.cumsum(free, axis=1)
     streak = count - np.maximum.accumulate(np.where(free, 0, count), axis=1)
     failed = np.select([of.slides, free.all(axis=-1), (streak > UNHELD).any(axis=-1)], [1, 2, 3], 0)
+    failed[:, :settle] = 0
     return np.asarray(failed, dtype=np.int8)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from pivoting.controller.example import EXAMPLES, Digit
 from pivoting.controller.solution import Solution
+from pivoting.models.lengths import NAMES
 from pivoting.sim.keys import GROUPS, KEYS
 from pivoting.sim.run import Run
 from pivoting.sim.scenario import Scenario
@@ -45,7 +46,8 @@ def print_run(console: Console, run: Run) -> None:
         for key, value in summary["resolved"].items()
     ]
     read = [f"{name}: {_words(summary[key])}" for key, name in _READ.items() if summary.get(key)]
-    for line in [", ".join(resolved)] * bool(resolved) + read:
+    lengths = f"lengths are taken to be in {NAMES[run.unit]}, from the size of gravity; what follows is in m and N"
+    for line in [lengths] * (run.unit != 1.0) + [", ".join(resolved)] * bool(resolved) + read:
         console.print(line, highlight=False, markup=False, soft_wrap=True, style="dim")
     table = Table()
     for heading in ("measured in MuJoCo" + (", worst world" if run.worlds > 1 else ""), "value", "limit", ""):

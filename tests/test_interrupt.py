@@ -9,6 +9,8 @@ from pathlib import Path
 from time import monotonic, sleep
 
 import pytest
+from pivoting.sim import Run
+from pivoting.sim.results import save
 
 from tests.processes import started
 
@@ -66,10 +68,29 @@ def test_in_the_loop(tmp_path: Path, times: int) -> None:
 
 
 def test_while_results_are_written(tmp_path: Path) -> None:
-    """Neither of the two files, and nothing in their stead."""
+    """None of the files, and nothing in their stead."""
     process = started("run", "balance-2d", "--out", str(tmp_path))
     interrupted_when(lambda: any(path.suffix == ".part" for path in tmp_path.iterdir()), process)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_results_appear_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shipped: Callable[[str], Run]
+) -> None:
+    """An interrupt between two of them comes when all are there."""
+    replace = Path.replace
+
+    def interrupted(part: Path, target: Path) -> Path:
+        if target.suffix == ".json":
+            signal.raise_signal(signal.SIGINT)
+        return replace(part, target)
+
+    monkeypatch.setattr(Path, "replace", interrupted)
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        save(shipped("snap-2d"), tmp_path)
+    assert signal.getsignal(signal.SIGINT) is before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["snap-2d.rrd", "snap-2d.summary.json", "summary.json"]
 
 
 LIBRARY = """
