@@ -111,7 +111,7 @@ def simulate(
     batch = Batch(model, int(worlds), nthread=1 if worlds == 1 else 0, persistent=True)
     errors = np.deg2rad(case.spread) * np.random.default_rng(seed).uniform(-1.0, 1.0, int(worlds))
     bounds = case.bounds(scene.unit)
-    drag = drag_wrench(attached.body, attached.controller, *told[:2])
+    drag = drag_wrench(attached.body, attached.controller, *told)
     depth = 0.0
     if case.chosen and rows is not None:
         first = _load(attached.controller, LawControl(attached.controller, told, bounds, drag), told)
