@@ -48,10 +48,10 @@ def choose(spec: mujoco.MjSpec, ours: mujoco.MjSpec, parts: list[Any]) -> dict[s
             replaced[name] = " and ".join(", ".join(f"{x:g}" for x in old) for old in sorted(olds))
         for part in parts:
             setattr(part, name, new)
-    for part in parts:
-        if isinstance(part, mujoco.MjsPair) and np.any(part.solreffriction):
-            replaced["solreffriction"] = ", ".join(f"{x:g}" for x in part.solreffriction)
-            part.solreffriction = 0.0, 0.0  # friction rows as the normal ones
+    for pair in parts:
+        if isinstance(pair, mujoco.MjsPair) and np.any(pair.solreffriction):
+            replaced["solreffriction"] = ", ".join(f"{x:g}" for x in pair.solreffriction[:2])
+            pair.solreffriction = np.zeros_like(pair.solreffriction)  # as solref
     solrefs = {tuple(np.asarray(part.solref)[:2].tolist()) for part in parts}
     replaced["solref"] = " and ".join(", ".join(f"{x:g}" for x in old) for old in sorted(solrefs))
     spec.option.o_solimp, spec.option.o_margin = ours.default.geom.solimp, 0.0

@@ -19,7 +19,7 @@ BOUNDED = STATUS.index("bounded")
 
 @dataclass(frozen=True, eq=False)
 class Measures:
-    """One value for each world, (W,); slip over the whole run, everything else after the scenario's `settle_s`.
+    """One value for each world, (W,); angles, lost contact, friction and forces after `settle_s`, all else over all.
 
     In the unit that the name ends with, whatever the model's unit of length is.
 
@@ -111,14 +111,19 @@ def predicted_slip(run: "Run") -> Array:
         return np.full(run.slip.shape, np.nan)
     point, omega = run.stepped[..., None, :], run.angular_velocity @ run.table_axes
     turning, touching = run.turning - point, run.lever - point
-    return drift(run.contact_rows, run.held, turning, touching, run.stepped_velocity, omega, unseen(run))
+    return drift(run.contact_rows, run.held, turning, touching, run.stepped_velocity, omega, unseen(run), _settle(run))
 
 
 def slip_floor_unknown(run: "Run") -> str:
     """Why that cannot be predicted, in the first world where it cannot; "" where it can in all."""
-    found = why_unknown(run.contact_rows, run.held, run.time)
+    found = why_unknown(run.contact_rows, run.held, run.time, _settle(run))
     told = [f"{why}{f' in world {world}' * (run.worlds > 1)}" for world, why in enumerate(found) if why]
     return told[0] if told else ""
+
+
+def _settle(run: "Run") -> int:
+    """Steps that the start may take."""
+    return int(np.count_nonzero(run.time[:-1] < run.scenario.limits.settle_s - 1e-12))
 
 
 def _rms(values: Array) -> Array:
