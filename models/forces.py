@@ -20,12 +20,15 @@ class JointDrag(NamedTuple):
         friction: (n,) greatest dry friction [N, N m].
         anchor: (3,) the point of the body whose velocity the translations are, body frame [m].
         slides: (2, 3) axes of the two slides of a planar body, world axes; (0, 3) for a free joint.
+        ahead: of the time to which the velocity belongs that MuJoCo damps: a time step where it integrates damping
+            implicitly, else 0 [s].
     """
 
     damping: Array
     friction: Array
     anchor: Array
     slides: Array
+    ahead: float
 
 
 def refuse_unknown_forces(model: mujoco.MjModel, body: int, support: int) -> None:
@@ -165,8 +168,10 @@ def read_drag(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> JointDra
     friction = np.array(model.dof_frictionloss[dof : dof + count]) * (not _off(model, "FRICTIONLOSS"))
     if not (damping.any() or friction.any()):
         return None
-    joint = int(model.body_jntadr[body])
+    joint, kinds = int(model.body_jntadr[body]), mujoco.mjtIntegrator
+    explicit = {int(kinds.mjINT_RK4): True, int(kinds.mjINT_EULER): _off(model, "EULERDAMP")}
+    ahead = 0.0 if explicit.get(int(model.opt.integrator), False) else float(model.opt.timestep)
     if count == 6:
-        return JointDrag(damping, friction, np.zeros(3), np.zeros((0, 3)))
+        return JointDrag(damping, friction, np.zeros(3), np.zeros((0, 3)), ahead)
     slides = np.array(data.xaxis[joint : joint + 2])
-    return JointDrag(damping, friction, np.array(model.jnt_pos[joint + 2]), slides)
+    return JointDrag(damping, friction, np.array(model.jnt_pos[joint + 2]), slides, ahead)

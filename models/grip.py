@@ -12,6 +12,7 @@ from enum import Enum
 
 import mujoco
 import numpy as np
+from pivoting.models.contact_rows import read_rows
 from pivoting.models.frames import Array, matrix, quaternion
 from pivoting.models.given import NEAR
 from pivoting.models.reading import RigidBody, initial_data, place
@@ -72,7 +73,8 @@ def grip(model: mujoco.MjModel, body: RigidBody, arc: Arc | None = None) -> Call
         if arc is not None:
             ends = (max(min(arc.theta, arc.theta_end), ends[0]), max(arc.theta, arc.theta_end))
         touching(stance, ends[1], PROBE * size)
-        depth = max(PROBE * size, _sunk(model, data, load))
+        rows = read_rows(model, body.index, body.support, [data.qpos])
+        depth = max(PROBE * size, 0.0 if rows is None else float(rows.depth(load)))
         edge, crowded = len(stance.points) == 2, False
         for theta in np.linspace(*ends, ANGLES):
             found = [touching(stance, theta, depth, leaning) for leaning in ((-LEANING, LEANING) if edge else (0.0,))]
@@ -82,14 +84,6 @@ def grip(model: mujoco.MjModel, body: RigidBody, arc: Arc | None = None) -> Call
         return Grip.CROWDED if crowded else Grip.FIRM
 
     return held
-
-
-def _sunk(model: mujoco.MjModel, data: mujoco.MjData, load: float) -> float:
-    """How deep one of the contacts sinks in under a load [N]: R f = K I depth [m], docs/fidelity.md."""
-    mujoco.mj_forward(model, data)
-    rows = [c.efc_address for c in data.contact if c.efc_address >= 0]
-    stiffness, impedance = data.efc_KBIP[rows, 0], data.efc_KBIP[rows, 2]
-    return float((data.efc_R[rows] * load / np.maximum(stiffness * impedance, 1e-300)).max(initial=0.0))
 
 
 def _rotation(axis: Array, angle: float) -> Array:

@@ -61,9 +61,7 @@ class Scene:
             ModelError: MuJoCo does not compile it, for the reason that it gives.
         """
         try:
-            with warnings.catch_warnings():  # `warned` has them
-                warnings.simplefilter("ignore", UserWarning)
-                model = self.spec.compile()
+            model = _compiled(self.spec)[0]
         except ValueError as error:
             raise ModelError(f"model = {str(self.path)!r}: MuJoCo cannot compile it ({error})") from None
         if self.mass is not None:  # of whatever the file derives it from: geoms, <inertial>, settotalmass
@@ -155,10 +153,8 @@ def load(
         why = "it is a directory" if path.is_dir() else "there is no such file"
         raise ModelError(f"model = {str(path)!r}: not a readable MJCF file ({why})")
     try:
-        with warnings.catch_warnings(record=True) as said:
-            warnings.simplefilter("always", UserWarning)
-            spec = mujoco.MjSpec.from_file(str(path))
-            raw = spec.compile()
+        spec = mujoco.MjSpec.from_file(str(path))
+        raw, warned = _compiled(spec)
     except ValueError as error:
         raise ModelError(f"model = {str(path)!r}: not a readable MJCF file ({' '.join(str(error).split())})") from None
     for part in (*spec.bodies[1:], *spec.geoms):
@@ -169,7 +165,7 @@ def load(
     own = spec.body(name)
     own.add_site(name=FILE_FRAME)
     spec.compiler.fusestatic = True  # what hangs on the body rigidly is part of it
-    read = spec.compile()
+    read = _compiled(spec)[0]
     ground = find_support(read, initial_data(read), body_id(read, name), support)
     table = spec.geom(read.geom(ground).name)
     geoms = list(own.find_all(mujoco.mjtObj.mjOBJ_GEOM))
@@ -178,12 +174,18 @@ def load(
         replaced = choose(
             spec, mujoco.MjSpec.from_file(str(scene_path("balance-2d"))), [*geoms, table, *_pairs(spec, geoms)]
         )
-    unit, warned = (
-        length_unit(raw.opt.gravity),
-        tuple(dict.fromkeys(" ".join(str(one.message).split()) for one in said)),
+    scene = Scene(
+        spec, path, name, table.name, None, 1.0, tuple(replaced.items()), length_unit(raw.opt.gravity), warned, read
     )
-    scene = Scene(spec, path, name, table.name, None, 1.0, tuple(replaced.items()), unit, warned, read)
     return scene.changed(changes or {})
+
+
+def _compiled(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, tuple[str, ...]]:
+    """The model, and what MuJoCo warned of, a line each, which Python would print in several."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", UserWarning)
+        model = spec.compile()
+    return model, tuple(dict.fromkeys(" ".join(str(one.message).split()) for one in said))
 
 
 def _resize(spec: mujoco.MjSpec, body: str, geoms: list[Any], size: float, unit: float) -> float:
@@ -201,7 +203,9 @@ def _resize(spec: mujoco.MjSpec, body: str, geoms: list[Any], size: float, unit:
 
 def _incline(table: Any, incline: float) -> None:
     """Tilt a plane of the world body; it rises to the right."""
-    if table.type != mujoco.mjtGeom.mjGEOM_PLANE or table.parent.id != 0:
+    if (
+        table.type != mujoco.mjtGeom.mjGEOM_PLANE or table.parent.name != "world"
+    ):  # ids are of what static bodies were fused into
         raise ModelError(f"incline = {incline:g}: the support is not a plane of the world body; tilt it in its file")
     half = 0.5 * np.deg2rad(incline)
     table.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT  # in place of the file's euler

@@ -13,6 +13,7 @@ from pivoting.controller.rotations import Turn
 from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product, space
 from pivoting.controller.validate import fail
+from pivoting.models.contact_rows import read_rows
 from pivoting.models.contact_settings import contact_settings
 from pivoting.models.frames import matrix
 from pivoting.models.friction import read_friction
@@ -26,7 +27,6 @@ from pivoting.sim.attach import Attached, attach
 from pivoting.sim.contact_readings import Declared
 from pivoting.sim.control import Answers, BoundedControl, Control, LawControl, States
 from pivoting.sim.engine_log import engine_log
-from pivoting.sim.fidelity import read_rows
 from pivoting.sim.joint_drag import drag_wrench
 from pivoting.sim.keys import CONTROL_KEYS
 from pivoting.sim.plan import Plan, planned, transplanted
@@ -111,7 +111,7 @@ def simulate(
     batch = Batch(model, int(worlds), nthread=1 if worlds == 1 else 0, persistent=True)
     errors = np.deg2rad(case.spread) * np.random.default_rng(seed).uniform(-1.0, 1.0, int(worlds))
     bounds = case.bounds(scene.unit)
-    drag = drag_wrench(attached.body, attached.controller, *told[:2])
+    drag = drag_wrench(attached.body, attached.controller, *told)
     depth = 0.0
     if case.chosen and rows is not None:
         first = _load(attached.controller, LawControl(attached.controller, told, bounds, drag), told)

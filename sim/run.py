@@ -11,6 +11,7 @@ from pivoting.controller.plan import Plan
 from pivoting.controller.so3 import rotated
 from pivoting.controller.space import CONJUGATE, Space, quaternion_product, space
 from pivoting.controller.units import lever
+from pivoting.models.contact_rows import ContactRows
 from pivoting.models.contact_settings import ContactSettings
 from pivoting.models.frames import matrix
 from pivoting.models.naming import geom_name
@@ -19,7 +20,7 @@ from pivoting.sim.advice import reasons, remedies
 from pivoting.sim.attach import Attached
 from pivoting.sim.contact_readings import ContactReadings, Declared
 from pivoting.sim.control import BOUNDED, Event, PlanLog, plan_figures
-from pivoting.sim.fidelity import ContactRows, Held, stepped_point
+from pivoting.sim.fidelity import Held, stepped_point
 from pivoting.sim.monitor import Measures, measure, slip_floor_unknown
 from pivoting.sim.relative import Load
 from pivoting.sim.scenario import Scenario

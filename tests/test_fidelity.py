@@ -3,14 +3,15 @@
 import io
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 import pytest
+from pivoting.models.contact_rows import read_rows
 from pivoting.sim import Run, own_object, simulate
-from pivoting.sim.fidelity import read_rows
 from pivoting.sim.monitor import predicted_slip, slip_floor_unknown
 from pivoting.sim.report import jsonable, print_run
 from rich.console import Console
@@ -47,13 +48,6 @@ def told(run: Run, within: float = 1e-3) -> None:
     assert not slip_floor_unknown(run)
     gap = np.linalg.norm(predicted_slip(run) - run.slip, axis=-1).max(axis=(1, 2))
     assert (gap <= within * run.measures.slip_max_m).all(), gap / run.measures.slip_max_m
-
-
-def prism(sides: int) -> str:
-    """A mesh asset and a geom of it; of so many sides MuJoCo gives each edge one contact at a time."""
-    angle = 2.0 * np.pi * np.arange(sides) / sides
-    corners = [(0.05 * np.cos(a), 0.05 * np.sin(a), z) for z in (0.0, 0.12) for a in angle]
-    return " ".join(f"{x:.6f}" for corner in corners for x in corner)
 
 
 @pytest.mark.parametrize(
@@ -113,7 +107,7 @@ def test_known_with_the_chosen_settings(tmp_path: Path, case: dict[str, Any], co
         {"geom": 'solref=".01 .5"'},
         {"option": ELLIPTIC, "geom": 'solref="-1000 -50"'},
         {"option": 'impratio="10"', "geom": 'margin=".004" gap=".001"'},
-        {"geom": 'friction=".35"'},
+        {"geom": 'friction=".45"'},
         {"option": 'integrator="implicitfast"', "geom": SOFT},
         {"option": 'integrator="implicit"', "geom": SOFT, "body": HEAVY + BOX},
         {"option": 'integrator="implicitfast"', "geom": SOFT, "joint": 'damping=".1"'},
@@ -124,7 +118,7 @@ def test_known_with_the_chosen_settings(tmp_path: Path, case: dict[str, Any], co
 )
 def test_known_as_modelled(tmp_path: Path, case: dict[str, Any], contact: str) -> None:
     """Pyramids, impedance that varies with the depth, margins, implicit integrators, overridden parameters."""
-    told(own(tmp_path, contact=contact, seconds=1.0, **{key: value for key, value in case.items()}))
+    told(own(tmp_path, contact=contact, **{"seconds": 1.0, **case}))
 
 
 @pytest.mark.parametrize(
@@ -154,18 +148,26 @@ def test_unknown_with_its_reason(tmp_path: Path, case: dict[str, Any], reason: s
     assert f"unknown: {summary['slip_floor_unknown']}" in out.getvalue()
 
 
-def test_a_short_edge_of_a_mesh(tmp_path: Path) -> None:
-    """MuJoCo gives the edge of a 12-sided prism one contact a step, at alternate ends: their motion is told."""
-    path = tmp_path / "prism.xml"
-    path.write_text(
-        f'<mujoco><asset><mesh name="m" vertex="{prism(12)}"/></asset><worldbody><geom type="plane" size="1 1 1"/><body '
-        'name="b"><freejoint/><geom type="mesh" mesh="m" mass=".3"/></body></worldbody></mujoco>'
-    )
-    run = simulate(own_object(path, "b", "lowest"), seconds=0.5)
-    unheld = np.isnan(run.held.give[0, :, :, 0])
-    assert (unheld.sum(axis=1) == 1).all()
-    assert (unheld.sum(axis=0) > 0.3 * len(unheld)).all()
-    told(run)
+@pytest.mark.parametrize(
+    ("first", "second", "reason"),
+    [
+        ([*range(500, 510), *range(600, 900, 2)], range(601, 900, 2), ""),
+        (range(500, 511), [], "an end of the edge is without contact at 0.51 s"),
+        ([500], [500], "no contact holds it at 0.5 s"),
+        (range(90), range(90), ""),
+    ],
+)
+def test_an_end_of_an_edge_may_be_without_contact_for_a_while(
+    first: list[int], second: list[int], reason: str, shipped: Callable[[str], Run]
+) -> None:
+    """As that of a mesh, to which MuJoCo gives one contact, at either end in turn; at the start both may be."""
+    run = shipped("pivot-3d")
+    give = run.held.give.copy()
+    give[:, first, 0] = give[:, second, 1] = np.nan
+    less = replace(run, held=run.held._replace(give=give))
+    assert slip_floor_unknown(less) == reason
+    if not reason:
+        told(less)
 
 
 def test_a_planar_body_of_ones_own(tmp_path: Path) -> None:
@@ -224,7 +226,7 @@ def test_default_contact_settings_would_fail() -> None:
 
 
 def test_a_pyramid_makes_the_shipped_settings_bounce(tmp_path: Path) -> None:
-    """Its edges make the normal as hard as impratio makes friction: stable from a timeconst of 2.23 h on, not at 2.1."""
+    """Its edges make the normal as hard as impratio makes friction: stable beyond a timeconst of 2.23 h, not at 2.1."""
     pyramid = 'cone="pyramidal" impratio="1000"'
     lost = {}
     for timeconst in (0.0042, 0.005):
@@ -234,16 +236,25 @@ def test_a_pyramid_makes_the_shipped_settings_bounce(tmp_path: Path) -> None:
     assert lost[0.005] == 0.0
 
 
-@pytest.mark.parametrize("solimp", [(0.9, 0.95, 0.001, 0.5, 2.0), (0.1, 0.9, 1e-4, 0.3, 3.0), (0.99, 0.5, 1e-4, 0.5, 1.0),
-                                    (0.2, 0.6, 0.0, 0.5, 2.0), (0.0, 1.0, 1e-3, 0.0, 2.0)])  # fmt: skip
-@pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
-def test_rows_at_any_depth_are_mujocos(solimp: tuple[float, ...], cone: str) -> None:
-    """The impedance and with it R follow from the depth as MuJoCo's own rows say."""
-    told = " ".join(f"{x:g}" for x in solimp)
-    model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><option cone="{cone}" impratio="7"/><default><geom solimp="{told}" friction=".6"/></default><worldbody>'
-        '<geom type="plane" size="1 1 1"/><body><freejoint/><geom type="box" size=".1 .1 .1"/></body></worldbody></mujoco>'
+def resting(cone: str, solimp: str) -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(
+        f'<mujoco><option cone="{cone}" impratio="7"/><default><geom solimp="{solimp}" friction=".6"/></default>'
+        '<worldbody><geom type="plane" size="1 1 1"/><body><freejoint/>'
+        '<geom type="box" size=".1 .1 .1" mass="3"/></body></worldbody></mujoco>'
     )
+
+
+def placed(model: mujoco.MjModel, height: float) -> np.ndarray:
+    return np.array([*model.qpos0[:2], height, 1.0, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    "solimp", [".9 .95 .001", ".1 .9 .0001 .3 3", ".99 .5 .0001 .5 1", ".2 .6 0", "0 1 .001 0 2", ".5 .5 .001"]
+)
+@pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
+def test_rows_at_any_depth_are_mujocos(solimp: str, cone: str) -> None:
+    """The impedance and with it R follow from the depth as MuJoCo's own rows say."""
+    model = resting(cone, solimp)
     rows = read_rows(model, 1, 0, [placed(model, 0.09)])
     assert rows is not None
     assert (rows.points, rows.pyramidal) == (4, cone == "pyramidal")
@@ -257,17 +268,10 @@ def test_rows_at_any_depth_are_mujocos(solimp: tuple[float, ...], cone: str) -> 
         np.testing.assert_allclose(R[:3], rows.softness(np.array(depth)) * D, rtol=1e-9)
 
 
-def placed(model: mujoco.MjModel, height: float) -> np.ndarray:
-    return np.array([*model.qpos0[:2], height, 1.0, 0.0, 0.0, 0.0])
-
-
 @pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
 @pytest.mark.parametrize("solimp", [".5 .5 .001", ".9 .95 .001", ".1 .9 .0001 .3 3"])
 def test_a_box_rests_at_the_depth_that_its_rows_say(cone: str, solimp: str) -> None:
-    model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><option cone="{cone}"/><default><geom solimp="{solimp}"/></default><worldbody>'
-        '<geom type="plane" size="1 1 1"/><body><freejoint/><geom type="box" size=".1 .1 .1" mass="3"/></body></worldbody></mujoco>'
-    )
+    model = resting(cone, solimp)
     rows = read_rows(model, 1, 0, [placed(model, 0.0999)])
     data = mujoco.MjData(model)
     data.qpos[:] = placed(model, 0.1)

@@ -145,5 +145,5 @@ def test_a_state_a_little_off_the_plane_is_planned_from_as_the_per_step_law_sees
     assert near.plan is not None
     assert plain.plan is not None
     np.testing.assert_allclose(near.plan.wrench, plain.plan.wrench, atol=1e-6)
-    with pytest.raises(ValueError, match="orientation = .*within 1 deg of the controller's plane"):
+    with pytest.raises(ValueError, match=r"orientation = .*within 1 deg of the controller's plane"):
         receding().replan(leaning(np.deg2rad(2.0)), towards(0.5, 0.8), None)
