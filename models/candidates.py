@@ -7,39 +7,21 @@ tilted about what; here is the order in which that is looked for.
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from itertools import chain, islice
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.models.faces import faces, promising
 from pivoting.models.frames import Array, matrix
 from pivoting.models.given import Shown, as_compiled, held_by_hand, written
 from pivoting.models.grip import Grip
 from pivoting.models.hull import TOLERANCE, Hull, read_hull
 from pivoting.models.naming import ModelError
 from pivoting.models.refusal import named, no_contact, not_held, option, out_of_range, within
-from pivoting.models.search import about, aside, held_at, of_no_face, on_face, search, spots, widest
-from pivoting.models.tilt import LEAST, Arc, Stance, interval
+from pivoting.models.search import held_at, search, widest
+from pivoting.models.tilt import Arc, Stance, interval
 
 TRIES = 400  # contacts among which a nearest one is looked for, or one beside which no other corner touches
 Gripped = Callable[[Stance], Grip]  # how the simulator holds it
-
-
-class Candidate(NamedTuple):
-    """A contact that a body may be pivoted about.
-
-    Attributes:
-        kind: "vertex", "rim", "round end" or "edge".
-        contact: as `--contact` and `stance` take it.
-        stance: that giving it yields, for an arc as long as its range.
-        face: number of the face that it lies on at theta = 0, in the order of the search, or None.
-    """
-
-    kind: str
-    contact: str
-    stance: Stance
-    face: int | None
 
 
 def contact_points(model: mujoco.MjModel, body_index: int) -> Array:
@@ -125,48 +107,6 @@ def stance(
     raise ModelError(reason + _way_out(body, contact, arc, now, gripped, shown))
 
 
-def contacts(
-    model: mujoco.MjModel,
-    body_index: int,
-    least: float = LEAST,
-    *,
-    gripped: Gripped | None = None,
-    shown: Shown = as_compiled,
-) -> list[Candidate]:
-    """All that a body may be pivoted about with a range of at least `least` [rad], face by face as `stance` looks.
-
-    A contact is listed again if on a later face its range is longer.
-
-    Raises:
-        ModelError: the body's shape cannot be served.
-    """
-    body = read_hull(model, body_index)
-    met = list(faces(body, promising(body, "vertex", least) | promising(body, "edge", least)))
-    longest: dict[str, float] = {}
-    found: list[Candidate] = []
-
-    def listed(some: Iterable[Stance], lies: int | None) -> None:
-        for one in some:
-            contact = written(one.points, shown)
-            if one.range[1] < max(least, longest.get(contact, 0.0) + 1e-6):
-                continue
-            if gripped is None or gripped(one) is not Grip.ALTERNATING:
-                longest[contact] = one.range[1]
-                found.append(Candidate(_kind(body, one), contact, one, lies))
-
-    for number, on in enumerate(met):
-        for kind in ("edge", "vertex"):
-            listed(on_face(body, on, kind, least), number)
-    for number, on in enumerate(met):  # about other axes, if about that towards the CoM it is no candidate
-        new = (held for held in spots(body, on, least) if written(held.points, shown) not in longest)
-        listed(aside(body, new, on.up, least), number)
-    for kind in ("edge", "vertex"):
-        for held, up in of_no_face(body, kind, least):
-            if written(held.points, shown) not in longest:
-                listed(about(body, held, up, least), None)
-    return found
-
-
 def planar_stance(
     model: mujoco.MjModel,
     body_index: int,
@@ -221,13 +161,6 @@ def _chosen(found: Iterable[Stance], gripped: Gripped | None) -> tuple[Stance | 
         if crowded is not None and tried >= TRIES:
             break
     return crowded, alternating
-
-
-def _kind(body: Hull, one: Stance) -> str:
-    """What a contact is called."""
-    if len(one.points) == 2:
-        return "edge"
-    return "round end" if one.radius[0] > 0.0 else "rim" if body.rank[one.owner[0]] == 2 else "vertex"
 
 
 def _down(body: Hull, one: Stance) -> Array:

@@ -21,7 +21,7 @@ def as_compiled(points: Array) -> Array:
 
 def written(points: Array, shown: Shown = as_compiled) -> str:
     """Points (K, 3) as a `--contact` value; of a round end the centre."""
-    return "; ".join(",".join(f"{x + 0.0:.6g}" for x in np.round(point, 9)) for point in shown(np.atleast_2d(points)))
+    return "; ".join(",".join(f"{x + 0.0:.6g}" for x in np.round(point, 7)) for point in shown(np.atleast_2d(points)))
 
 
 def held_by_hand(body: Hull, contact: ArrayLike, shown: Shown = as_compiled) -> Held:

@@ -17,7 +17,7 @@ from pivoting.models.frames import Array, matrix, quaternion
 from pivoting.models.given import NEAR
 from pivoting.models.reading import RigidBody, initial_data, place
 from pivoting.models.supports import body_size
-from pivoting.models.tilt import Arc, Stance
+from pivoting.models.tilt import Arc, Stance, cross
 
 PROBE = 1e-5  # of the body's size, how deep it is to make any contact
 LOAD = 0.5  # of the weight, which the smallest wrench leaves to the contact
@@ -57,13 +57,14 @@ def grip(model: mujoco.MjModel, body: RigidBody, arc: Arc | None = None) -> Call
         at = at + (stance.radius[0] - depth - (at - body.origin) @ table[:, 2]) * table[:, 2]
         length = float(np.linalg.norm(along))
         if leaning:
-            across = np.cross([0.0, 0.0, 1.0], level @ along / length)
+            across = cross(np.array([0.0, 0.0, 1.0]), level @ along / length)
             level = _rotation(across, np.arctan(2.0 * leaning * depth / length)) @ level
         place(model, data, body, quaternion(table @ level), first + 0.5 * along, at)
         mujoco.mj_collision(model, data)
-        ours = (c for c in data.contact if body.support in c.geom and body.index in model.geom_bodyid[c.geom])
-        found = [c.pos for c in ours if c.dist < 0.0]
-        points = (np.reshape(found, (-1, 3)) - data.xpos[body.index]) @ data.xmat[body.index].reshape(3, 3)
+        geoms = data.contact.geom
+        ours = (geoms == body.support).any(axis=1) & (model.geom_bodyid[geoms] == body.index).any(axis=1)
+        found = data.contact.pos[ours & (data.contact.dist < 0.0)]
+        points = (found - data.xpos[body.index]) @ data.xmat[body.index].reshape(3, 3)
         points = points + stance.radius[0] * stance.up(theta) - first
         share = np.clip(points @ along / max(length**2, 1e-300), 0.0, 1.0)
         return share, np.linalg.norm(points - share[:, None] * along, axis=1)

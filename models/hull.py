@@ -165,7 +165,7 @@ def read_hull(model: mujoco.MjModel, index: int, tolerance: float = TOLERANCE) -
         tolerance: of the body's size, within which a point touches.
 
     Raises:
-        ModelError: it has no colliding geom, one of a kind without a hull, or is one ball or ellipsoid.
+        ModelError: it has no colliding geom, one of a kind without a hull, or is one ball, or ellipsoids.
     """
     name, geoms = body_name(model, index), colliding(model, index)
     if not geoms:
@@ -175,14 +175,12 @@ def read_hull(model: mujoco.MjModel, index: int, tolerance: float = TOLERANCE) -
     half = np.linalg.norm(axes, axis=1)
     rank = np.count_nonzero(half, axis=1)
     radius = np.where(np.ptp(half, axis=1) <= 1e-9 * half.max(axis=1), half.max(axis=1), 0.0)
-    if (rank == 3).all() and len(np.unique(centre[radius > 0.0], axis=0)) < 2:
+    balls = len(np.unique(np.column_stack([centre, radius])[radius > 0.0], axis=0))
+    if (rank == 3).all() and (balls == 0 or balls + np.count_nonzero(radius == 0.0) < 2):
         rolls = "it is all sphere or ellipsoid, and these roll: no tilt lifts it off one point"
         raise ModelError(f"body = {name!r}: {rolls}; must have a box, a mesh, a cylinder or a capsule")
     size = float(np.linalg.norm((centre + extent).max(axis=0) - (centre - extent).min(axis=0)))
-    owner = np.repeat(np.arange(len(rank)), [len(SAMPLES[k]) for k in rank.tolist()])
-    points = centre[owner]
-    for i in np.flatnonzero(rank > 0):
-        points[owner == i] += SAMPLES[int(rank[i])] @ axes[i].T
+    points, owner = sampled(centre, axes, SAMPLES)
     try:  # C-: facets that are coplanar but for rounding (meshes are float32) become one, their inner corners none
         hull = ConvexHull(points, qhull_options=f"Qt C-{0.1 * TOLERANCE * size}")
     except QhullError:
@@ -194,6 +192,17 @@ def read_hull(model: mujoco.MjModel, index: int, tolerance: float = TOLERANCE) -
     ups, beside = -hull.equations[:, :3], hull.neighbors.astype(int)
     labels = {geom: label(model, geom) for geom in geoms}
     return Hull(name, labels, com, *fields, ups, facets, beside, size, tolerance * size)
+
+
+def sampled(centre: Array, axes: Array, shapes: Mapping[int, Array]) -> tuple[Array, Indices]:
+    """(M, 3) points of ellipsoids c + A x, whose x are `samples` by the rank of A; (M,) of which each is."""
+    rank = np.count_nonzero(axes.any(axis=1), axis=1)
+    owner = np.repeat(np.arange(len(rank)), np.array([len(shapes.get(k, ())) for k in range(4)])[rank])
+    points, starts = centre[owner], np.searchsorted(owner, np.arange(len(rank)))
+    for i in np.flatnonzero(rank):
+        some = shapes[int(rank[i])]
+        points[starts[i] : starts[i] + len(some)] += some @ axes[i].T
+    return points, owner
 
 
 def colliding(model: mujoco.MjModel, index: int) -> list[int]:

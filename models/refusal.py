@@ -10,10 +10,15 @@ from pivoting.models.hull import Hull
 from pivoting.models.tilt import Arc, Held, Stance, next_touch
 
 
-def within(arc: Arc, most: float) -> str:
+def bounds(arc: Arc, most: float) -> tuple[float, float]:
     """What a range from 0 to `most` [rad] leaves to an arc, in degrees, rounded inwards."""
     low, high = np.rad2deg(arc.limits(most))
-    low, high = np.ceil(1e3 * low - 1e-6) / 1e3 + 0.0, np.floor(1e3 * high + 1e-6) / 1e3
+    return float(np.ceil(1e3 * low - 1e-6) / 1e3 + 0.0), float(np.floor(1e3 * high + 1e-6) / 1e3)
+
+
+def within(arc: Arc, most: float) -> str:
+    """The same in words."""
+    low, high = bounds(arc, most)
     return f"[{low:g}, {high:g}] deg" if low < high else f"nothing, as its range ends at {np.rad2deg(most):.3g} deg"
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from pivoting.models.faces import SLACK, Face, face, faces, middle, promising
 from pivoting.models.frames import Array
 from pivoting.models.given import ALLOWED, Shown, as_compiled, held_by_hand
@@ -70,9 +70,8 @@ def _by_hand(body: Hull, held: Held, least: float, now: Array | None) -> Iterato
         yield from filter(None, [tilted(body, held, up)])
     for up in met:
         yield from aside(body, [held], up, least)
-    for same, up in of_no_face(body, "vertex" if len(held.points) == 1 else "edge", least, held.owner):
-        if np.linalg.norm(same.points - held.points) <= body.reach:
-            yield from about(body, held, up, least)
+    for same, up in of_no_face(body, "vertex" if len(held.points) == 1 else "edge", least, held):
+        yield from about(body, same, up, least)
 
 
 def widest(body: Hull) -> Iterator[Stance]:
@@ -120,29 +119,37 @@ def spots(body: Hull, on: Face, least: float) -> list[Held]:
     return [held_at(body, on.points[[i]], on.owner[[i]], on.up) for i in on.around[wide]]
 
 
-def of_no_face(body: Hull, kind: str, least: float, of: Indices | None = None) -> Iterator[tuple[Held, Array]]:
+def of_no_face(body: Hull, kind: str, least: float, only: Held | None = None) -> Iterator[tuple[Held, Array]]:
     """Edges or vertices of the hull, each with a normal of a table on which it stands on that alone, CoM lowest first.
 
-    They are of two corners, or of a corner, ball or rim, all of them or those `of` some ellipsoids.
+    They are of two corners, or of a corner, ball or rim, all of them or `only` one.
     """
     some: list[tuple[Indices, Array]] = []
+    mine = np.ones(len(body.rank), dtype=bool) if only is None else np.isin(np.arange(len(body.rank)), only.owner)
     if kind == "edge":
         for f, k in np.argwhere((body.bends >= SLACK * least) & (np.arange(len(body.ups))[:, None] < body.beside)):
             pair = np.delete(body.facets[f], k)
-            if pair[0] != pair[1] and not body.rank[pair].any() and (of is None or set(of) == set(pair)):
+            if pair[0] != pair[1] and not body.rank[pair].any() and mine[pair].all():
                 some.append((pair, middle(body, np.array([f, body.beside[f, k]]))))
     else:
-        tips = np.flatnonzero(((body.rank == 0) & (body.cones >= SLACK * least)) | (body.radius > 0.0))
-        tips = tips if of is None else np.intersect1d(tips, of)
-        some = [(tip, middle(body, body.facets_of(tip))) for tip in tips[:, None]]
+        wide = (body.rank == 0) | (body.radius > 0.0)
+        for tip in np.flatnonzero(mine & wide & (body.cones >= SLACK * least))[:, None]:
+            some.append((tip, middle(body, body.facets_of(tip))))
     found = [(held_at(body, body.lowest(up, which), which, up), up) for which, up in some]
-    rims = np.flatnonzero(body.rank == 2) if kind == "vertex" else np.array([], dtype=int)
-    for rim, near in zip(rims, body.rims(body.com), strict=False):
-        for point in (near, 2.0 * body.centre[rim] - near):
-            up = (body.centre[rim] - point) / np.linalg.norm(body.centre[rim] - point)
-            found.append((Held(point[None], 0.0, np.array([rim])), up))
+    if kind == "vertex":
+        found += _of_rims(body, mine, None if only is None else only.points[0])
     height = [float((body.com - held.points[0]) @ up) for held, up in found]
     yield from (found[k] for k in np.argsort(height, kind="stable"))
+
+
+def _of_rims(body: Hull, mine: NDArray[np.bool_], point: Array | None) -> Iterator[tuple[Held, Array]]:
+    """A point of each rim, or that closest to and that farthest from the CoM, below the rim's centre."""
+    near = body.rims(body.com)
+    for rim, close in zip(np.flatnonzero(body.rank == 2), near, strict=True):
+        for at in (close, 2.0 * body.centre[rim] - close) if point is None else (point,):
+            away = body.centre[rim] - at
+            if mine[rim]:
+                yield Held(at[None], 0.0, np.array([rim])), away / np.linalg.norm(away)
 
 
 def held_at(body: Hull, points: Array, owner: Indices, up: Array) -> Held:

@@ -98,8 +98,12 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def touches(body: Hull, held: Held, up: Array) -> bool:
-    """Whether all that is held is on a table of normal `up` (3,)."""
-    return bool((held.points @ up).max() - held.radius <= body.least(up).min() + body.reach)
+    """Whether all that is held is on a table of normal `up` (3,), points of rims as what is lowest of these."""
+    if (held.points @ up).max() - held.radius > body.least(up).min() + body.reach:
+        return False
+    tilted = np.linalg.norm(up @ body.axes[held.owner], axis=1) > body.reach
+    off = np.linalg.norm(body.lowest(up, held.owner) - held.points, axis=1) > body.reach
+    return not bool(((body.rank[held.owner] == 2) & tilted & off).any())
 
 
 def tilted(body: Hull, held: Held, up: Array, now: Array | None = None, inward: Array | None = None) -> Stance | None:
@@ -188,22 +192,25 @@ def _lowest(body: Hull, held: Held, up: Array, inward: Array, theta: float) -> b
 
 
 def _inward(body: Hull, held: Held, up: Array) -> Array:
-    """(3,) horizontally to the CoM from one point, or of a rim to its centre."""
-    lever = body.com - held.points[0]
-    inward = [*(body.centre[_rim(body, held)] - held.points[0]), lever][0]
+    """(3,) horizontally to the CoM from one point; of a rim to its centre, or if that is above it, along its axis."""
+    lever, rims = body.com - held.points[0], _rim(body, held)
+    inward = body.centre[rims[0]] - held.points[0] if rims.size else lever
     inward = inward - (inward @ up) * up
-    if np.linalg.norm(inward) <= body.reach:  # balanced
+    if np.linalg.norm(inward) <= body.reach and rims.size:
+        inward = np.linalg.svd(body.axes[rims[0]])[0][:, 2]
+        inward = inward if inward @ lever >= 0.0 else -inward
+    elif np.linalg.norm(inward) <= body.reach:  # balanced
         inward = cross(np.eye(3)[np.abs(up).argmin()], up)
     return inward / np.linalg.norm(inward)
 
 
 def _rim(body: Hull, held: Held) -> Indices:
-    """The rims that the point is on."""
+    """The rims that any of the points is on."""
     which = np.flatnonzero(body.rank == 2)
-    if not which.size:
-        return which
-    on = np.linalg.norm(body.rims(held.points[0]) - held.points[0], axis=1) <= body.reach * (held.radius == 0.0)
-    return which[on]
+    if not which.size or held.radius > 0.0:
+        return which[:0]
+    off = np.stack([np.linalg.norm(body.rims(point) - point, axis=1) for point in held.points])
+    return which[(off <= body.reach).any(axis=0)]
 
 
 def _near(body: Hull, held: Held) -> Indices | None:
@@ -243,7 +250,7 @@ def _interval(body: Hull, held: Held, up: Array, inward: Array, some: Indices | 
     v = vectors[..., 1] * np.sign((vectors[..., 1] * c).sum(axis=-1, keepdims=True))
     half = np.arctan2(np.sqrt(np.maximum(values[..., 1], 0.0)), np.sqrt(np.maximum(-values[..., 0], 0.0)))
     lowest = np.stack([body.lowest(way, wide) for way in inward])
-    own = _between(held, lowest, body.reach)
+    own = _between(held, lowest, body.reach) | np.isin(wide, _rim(body, held))
     half[own], v[own] = 0.5 * np.pi, c[own]  # a half-plane: of a rim that the points are on
     angle = np.arctan2(v[..., 1], v[..., 0])
     return np.maximum(low, (angle - half).max(axis=1)), np.minimum(high, (angle + half).min(axis=1))

@@ -1,4 +1,4 @@
-"""The command line: `pivoting example | list | run`. Exit 0 for a pass, 1 for a fail, 2 for bad usage in one line."""
+"""The command line: `pivoting example | list | contacts | run`. Exit 0: pass, 1: fail, 2: bad usage in one line."""
 
 import sys
 import tempfile
@@ -164,6 +164,25 @@ def run(
     for line in () if saved is None else saved.said:
         click.echo(line)  # under --json on stderr, as all else
     return 1 if finished.verdict == "fail" else 0
+
+
+@cli.command()
+@click.option("--model", type=click.Path(path_type=Path), required=True, help="An MJCF file of your own.")
+@click.option("--body", required=True, help="Name of the body in it that is to be pivoted.")
+@click.option("--support", help="Name of the plane or box geom that it stands on; by default what is under it.")
+@click.option("--least", type=click.FloatRange(min=0.1), default=5.0, show_default=True, help="Least range, deg.")
+@json_option("Print them all as one JSON object and nothing else.")
+def contacts(model: Path, body: str, support: str | None, least: float, as_json: JsonOutput | None) -> int:
+    """What a body may be turned about: each contact as `run pivot --contact` takes it, and the angles it allows."""
+    from pivoting.sim.contact_list import print_contacts, read_contacts
+
+    with _progress(f"contacts of {body}"):
+        found = read_contacts(model, body, support, least)
+    if as_json:
+        as_json(found)
+    else:
+        print_contacts(console(), found)
+    return 0
 
 
 def _advised(advice: dict[str, Any]) -> str:

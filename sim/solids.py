@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.models.frames import matrix
-from pivoting.models.hull import circle, colliding, ellipsoids, samples
+from pivoting.models.hull import circle, colliding, ellipsoids, sampled, samples
 from pivoting.models.reading import RigidBody
 from scipy.spatial import ConvexHull
 
@@ -33,10 +33,8 @@ def body_solids(model: mujoco.MjModel, body: RigidBody) -> list[Solid]:
     """The colliding geoms of a body in object axes, as convex as MuJoCo takes them."""
     geoms = colliding(model, body.index)
     owner, centres, axes = ellipsoids(model, geoms)
-    round_ones = samples(SIDES)
-    clouds = [c + round_ones[int(np.count_nonzero(A.any(axis=0)))] @ A.T for c, A in zip(centres, axes, strict=True)]
-    whose = np.repeat(owner, [len(cloud) for cloud in clouds])
-    points = (np.concatenate(clouds) - body.com) @ matrix(body.axes)
+    points, which = sampled(centres, axes, samples(SIDES))
+    points, whose = (points - body.com) @ matrix(body.axes), owner[which]
     return [_hull(points[whose == geom]) for geom in geoms]
 
 
@@ -46,9 +44,10 @@ def _hull(points: Array) -> Solid:
     corners, normals = hull.points[hull.simplices], hull.equations[:, :3]
     outward = np.linalg.det(corners - hull.points.mean(axis=0)) > 0.0
     corners = np.where(outward[:, None, None], corners, corners[:, ::-1])
-    pairs = [(i, j) for i, row in enumerate(hull.neighbors) for j in row if i < j]
-    sharp = [np.intersect1d(*hull.simplices[[i, j]]) for i, j in pairs if normals[i] @ normals[j] < SHARP]
-    lines = hull.points[np.array(sharp, dtype=int).reshape(-1, 2)]
+    bends = np.einsum("fi,fki->fk", normals, normals[hull.neighbors]) < SHARP
+    face, corner = np.nonzero(bends & (np.arange(len(normals))[:, None] < hull.neighbors))
+    ends = np.stack([hull.simplices[face, (corner + k) % 3] for k in (1, 2)], axis=1)  # across from that corner
+    lines = hull.points[np.sort(ends, axis=1)]
     return Solid(corners.reshape(-1, 3), np.repeat(normals, 3, axis=0), lines)
 
 
