@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.models.frames import Array, matrix
-from pivoting.models.naming import ModelError, label
+from pivoting.models.naming import ModelError, body_name, label
 from scipy.spatial import ConvexHull, QhullError
 
 Indices = NDArray[np.int64]
@@ -167,7 +167,7 @@ def read_hull(model: mujoco.MjModel, index: int, tolerance: float = TOLERANCE) -
     Raises:
         ModelError: it has no colliding geom, one of a kind without a hull, or is one ball or ellipsoid.
     """
-    name, geoms = model.body(index).name, colliding(model, index)
+    name, geoms = body_name(model, index), colliding(model, index)
     if not geoms:
         raise ModelError(f"body = {name!r}: it has no colliding geom; must have one with contype, conaffinity or pair")
     geom, centre, axes = ellipsoids(model, geoms)

@@ -69,4 +69,4 @@ def not_held(body: Hull, contact: str | ArrayLike, edge: Stance, shown: Shown = 
     what = (
         f"the edge {written(edge.points, shown)} of geom {whose}, {length:.3g} m long, is held by one contact at a time"
     )
-    return f"{named(contact, shown)}: {what}, as MuJoCo makes few of a mesh, and none close to another"
+    return f"{named(contact, shown)}: {what}, as MuJoCo makes few contacts of such geoms, and none close to another"

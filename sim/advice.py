@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from time import process_time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +16,7 @@ SLIDES = 0.999  # of mu f_n: at more a contact slides
 ROOM = 0.85  # of the friction found that is planned with
 QUICK = 0.2  # of a time step: a law with a greater bandwidth cannot be followed
 SHIPPED = {"impedance": 0.5, "impratio": 1000.0}
-BUDGET = 10.0  # [s] of the processor's time after which nothing further is tried
+TRIES = 10  # of remedies, at most
 
 
 @dataclass(frozen=True)
@@ -238,17 +237,28 @@ def _up(value: float) -> float:
     return float(f"{np.ceil(value / step - 1e-9) * step:.2g}")
 
 
-def tried(run: "Run", simulate: Callable[..., "Run"], budget: float = BUDGET) -> dict[str, Any] | None:
-    """The first remedy that holds the run, by running it: keys, setting and why; None if none was found in time."""
-    start = process_time()
+def tried(run: "Run", simulate: Callable[..., "Run"], most: int = TRIES) -> dict[str, Any]:
+    """Try the remedies of a failing run, in their order, until one holds it.
+
+    Args:
+        simulate: what runs a scenario.
+        most: how many are tried.
+
+    Returns:
+        holds: the keys that hold every world, None if none did.  setting, why: in words, of that.
+        tried: the settings that were tried and did not hold it.  untried: those that are left.
+    """
+    left: list[Remedy] = remedies(run)
+    failed: list[str] = []
     scenario: Scenario = run.scenario
-    for one in remedies(run):
-        if process_time() - start > budget:
-            return None
+    while left and len(failed) < most:
+        one = left.pop(0)
         try:
             again = simulate(scenario.change(**one.keys), run.worlds, run.seed)
         except (ValueError, RuntimeError):  # the key does not fit the scenario: it is no remedy
             continue
         if again.verdict == "pass":
-            return {"keys": dict(one.keys), "setting": one.setting, "why": one.why}
-    return None
+            found = {"holds": dict(one.keys), "setting": one.setting, "why": one.why}
+            return {**found, "tried": failed, "untried": [other.setting for other in left]}
+        failed.append(one.setting)
+    return {"holds": None, "setting": "", "why": "", "tried": failed, "untried": [other.setting for other in left]}

@@ -82,8 +82,8 @@ class Attached:
             ValueError: `reference` is not finite.
         """
         target = reference if isinstance(reference, Motion) else Motion(reference)
-        state, omega = self.state(data), self.controller.space.lift_motion(target)[1]
-        known = drag_wrench(self.body, self.controller, self._orientation(data), omega)[0]
+        state, turning = self.state(data), self.controller.space.lift_motion(target)[1:]
+        known = drag_wrench(self.body, self.controller, self._orientation(data), *turning)[0]
         return solve(self.controller.problem(state, target, external=known))
 
     def wrench(self, data: mujoco.MjData, reference: ArrayLike | Motion) -> Array:

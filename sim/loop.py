@@ -18,7 +18,7 @@ from pivoting.models.contact_settings import contact_settings
 from pivoting.models.frames import matrix
 from pivoting.models.friction import read_friction
 from pivoting.models.given import NEAR
-from pivoting.models.naming import ModelError
+from pivoting.models.naming import ModelError, body_id, geom_id
 from pivoting.models.reading import initial_data, place, read_body, turn
 from pivoting.models.scenes import Scene, load
 from pivoting.models.sensors import instrument
@@ -111,7 +111,7 @@ def simulate(
     batch = Batch(model, int(worlds), nthread=1 if worlds == 1 else 0, persistent=True)
     errors = np.deg2rad(case.spread) * np.random.default_rng(seed).uniform(-1.0, 1.0, int(worlds))
     bounds = case.bounds(scene.unit)
-    drag = drag_wrench(attached.body, attached.controller, *told[:2])
+    drag = drag_wrench(attached.body, attached.controller, *told)
     depth = 0.0
     if case.chosen and rows is not None:
         first = _load(attached.controller, LawControl(attached.controller, told, bounds, drag), told)
@@ -260,6 +260,8 @@ def believe(
     nominal = believed.compile()
     case = replace(case, body=believed.body, support=believed.support)
     plan = planned(case, nominal, read.unit)
+    if case.chosen and case.mu is None:  # what the file itself says of friction holds: it may have none
+        read_friction(read.read, body_id(read.read, read.body), geom_id(read.read, read.support), plan.contacts)
     if controller is not None:
         _check(controller, case, plan)
     if plan.load.force == 0.0 and (case.f_min if controller is None else controller.belief.f_min.max()) == 0.0:

@@ -19,7 +19,7 @@ BOUNDED = STATUS.index("bounded")
 
 @dataclass(frozen=True, eq=False)
 class Measures:
-    """One value for each world, (W,); slip over the whole run, everything else after the scenario's `settle_s`.
+    """One value for each world, (W,); angles, lost contact, friction and forces after `settle_s`, all else over all.
 
     In the unit that the name ends with, whatever the model's unit of length is.
 

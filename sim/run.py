@@ -14,8 +14,8 @@ from pivoting.controller.units import lever
 from pivoting.models.contact_rows import ContactRows
 from pivoting.models.contact_settings import ContactSettings
 from pivoting.models.frames import matrix
-from pivoting.models.naming import label
-from pivoting.models.reading import RigidBody
+from pivoting.models.naming import geom_name
+from pivoting.models.reading import RigidBody, file_frame
 from pivoting.sim.advice import reasons, remedies
 from pivoting.sim.attach import Attached
 from pivoting.sim.contact_readings import ContactReadings, Declared
@@ -329,7 +329,7 @@ class Run:
             "reasons": reasons(self),
             "remedies": [remedy.setting for remedy in remedies(self)],
             "undeclared_contacts": self.strays,
-            "support": label(self.model, self.truth.support).strip("'"),
+            "support": geom_name(self.model, self.truth.support),
             "object": self.object,
             "contact_settings": self.contact_settings,
             "events": [event._asdict() for event in self.events],
@@ -340,15 +340,20 @@ class Run:
 
     @property
     def object(self) -> dict[str, Any]:
-        """What was read of the object, as the world has it; the contacts in its body frame."""
-        R = matrix(self.truth.axes)
+        """What was read of the object, as the world has it, in the frame that its file gives the body.
+
+        `contact` is what --contact takes, in the file's own unit of length.
+        """
+        origin, axes = file_frame(self.model, self.truth.index)
+        contacts = (self.truth.com + self.points @ matrix(self.truth.axes).T - origin) @ axes
         return {
-            "support": label(self.model, self.truth.support).strip("'"),
+            "support": geom_name(self.model, self.truth.support),
             "mass_kg": self.truth.mass,
             "inertia_kg_m2": (self.unit**2 * np.asarray(self.truth.inertia)).tolist(),
-            "com_m": (self.unit * self.truth.com).tolist(),
+            "com_m": (self.unit * (self.truth.com - origin) @ axes).tolist(),
             "mu": self.mu_world,
-            "contacts_m": (self.unit * (self.truth.com + self.points @ R.T)).tolist(),
+            "contacts_m": (self.unit * contacts).tolist(),
+            "contact": "; ".join(",".join(f"{x:.9g}" for x in point) for point in contacts),
             "radius_m": (self.unit * self.radius).tolist(),
             "damping": 0.0 if self.truth.drag is None else float(self.truth.drag.damping.max()),
             "frictionloss": 0.0 if self.truth.drag is None else float(self.truth.drag.friction.max()),

@@ -23,7 +23,7 @@ def contacts_of(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> list[t
 
 
 def contact_margin(model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody) -> float:
-    """How far from its support the body is held [m]: the margin, less the gap, of the contacts that `data` has."""
+    """How far from its support the body is held [m]: the margin of the contacts that `data` has."""
     held = contacts_of(model, data, body.index)
     return max((float(contact.includemargin) for _, other, contact in held if other == body.support), default=0.0)
 
