@@ -19,6 +19,8 @@ from rich.console import Console
 BOX = '<geom type="box" size=".05 .04 .06" mass="1" {}/>'
 STACK = '<geom type="box" size=".1 .098 .115" pos="0 0 .115"/><geom type="box" size=".1 .098 .07" pos="0 0 .3"/>'
 HEAVY = '<inertial pos=".02 .01 .03" mass="1" diaginertia=".002 .001 .0015" quat=".9 .1 .2 .1"/>'
+PAIR = '<pair geom1="floor" geom2="g" friction="1 .5" solreffriction=".1 1"/>'
+NAMED = BOX.replace("<geom", '<geom name="g"')
 ELLIPTIC, SOFT = 'cone="elliptic"', 'solref=".01 1" solimp=".6 .6 .001"'
 
 
@@ -32,13 +34,15 @@ def own(
     chosen: bool = False,
     floor: str = "",
     joint: str = "",
+    extra: str = "",
     **keys: Any,
 ) -> Run:
     """A file of a user's, pivoted: as it is modelled, if not with the chosen settings."""
     path = folder / "object.xml"
     path.write_text(
         f'<mujoco><option {option}/><worldbody><geom name="floor" type="plane" size="5 5 .1" {geom} {floor}/>'
-        f'<body name="object" pos="0 0 1"><joint type="free" {joint}/>{body.format(geom)}</body></worldbody></mujoco>'
+        f'<body name="object" pos="0 0 1"><joint type="free" {joint}/>{body.format(geom)}</body></worldbody>'
+        f"{extra}</mujoco>"
     )
     return simulate(own_object(path, "object", contact, chosen=chosen), **{"spread": 0.0, "seconds": 0.5, **keys})
 
@@ -113,6 +117,8 @@ def test_known_with_the_chosen_settings(tmp_path: Path, case: dict[str, Any], co
         {"option": 'integrator="implicitfast"', "geom": SOFT, "joint": 'damping=".1"'},
         {"option": 'o_solref=".01 1" o_solimp=".8 .8 .001 .5 2"><flag override="enable"/></option><option '},
         {"body": STACK, "geom": SOFT},
+        {"option": ELLIPTIC, "geom": 'margin=".002" solimp=".1 .9 .0001 .3 3"'},
+        {"option": ELLIPTIC, "body": NAMED, "extra": f"<contact>{PAIR}</contact>"},
     ],
     ids=str,
 )
@@ -181,6 +187,17 @@ def test_a_planar_body_of_ones_own(tmp_path: Path) -> None:
             "</worldbody></mujoco>"
         )
         told(simulate(own_object(path, "b", "vertex", chosen=False), theta_end=60.0, seconds=0.6))
+
+
+@pytest.mark.parametrize("contact", ["edge", "vertex"])
+def test_an_object_of_ones_own_starts_at_rest(tmp_path: Path, contact: str) -> None:
+    """In the table as deep as its load presses it, and so does not slide at once; and rises as that grows less."""
+    small = '<geom type="box" size=".005 .004 .006" mass=".1"/>'
+    run = own(tmp_path, body=small, contact=contact, chosen=True, mu=0.3, theta=25.0, theta_end=5.0)
+    np.testing.assert_allclose(run.force_measured[0, 0], run.force[0, 0], rtol=0.05, atol=0.005)
+    assert not run.held.slides.any()
+    assert np.diff(run.corner[0, [0, -1], 0, 2])[0] > 1e-6
+    assert run.measures.contact_lost_s[0] == 0.0
 
 
 def test_creep_under_a_constant_load() -> None:
