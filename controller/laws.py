@@ -87,7 +87,7 @@ class Law:
     @property
     def coefficients(self) -> tuple[float, float, float, float]:
         """(feedforward, kp, kd, velocity_terms), as the compiled law takes them."""
-        return self.feedforward, self.kp, self.kd, self.velocity_terms
+        return float(self.feedforward), float(self.kp), float(self.kd), float(self.velocity_terms)
 
 
 @inlined
