@@ -203,9 +203,8 @@ def _resize(spec: mujoco.MjSpec, body: str, geoms: list[Any], size: float, unit:
 
 def _incline(table: Any, incline: float) -> None:
     """Tilt a plane of the world body; it rises to the right."""
-    if (
-        table.type != mujoco.mjtGeom.mjGEOM_PLANE or table.parent.name != "world"
-    ):  # ids are of what static bodies were fused into
+    fixed = table.parent.id == 0 and table.frame is None  # of a static body that was fused the frame is left
+    if table.type != mujoco.mjtGeom.mjGEOM_PLANE or not fixed:
         raise ModelError(f"incline = {incline:g}: the support is not a plane of the world body; tilt it in its file")
     half = 0.5 * np.deg2rad(incline)
     table.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT  # in place of the file's euler

@@ -79,10 +79,10 @@ def test_the_contact_is_found_once_as_it_is_believed(contact: object, incline: f
     assert run.verdict == "fail"
 
 
-def test_an_incline_of_a_table_that_is_not_a_plane_is_refused(tmp_path: Path) -> None:
+def test_an_incline_of_what_is_no_plane_of_the_world_is_refused(tmp_path: Path) -> None:
+    """It would be in the frame of what holds it."""
     box = '<geom name="t" type="box" size=".5 .5 .1" pos="0 0 -.1"/>'
-    moved = f'<body name="room">{FLOOR}</body>'
-    for floor in (box, moved):
+    for floor in (box, f'<body euler="0 0 90">{FLOOR}</body>', f'<frame euler="0 0 90">{FLOOR}</frame>'):
         with pytest.raises(ModelError, match="incline = 3: the support is not a plane of the world body"):
             simulate(own(tmp_path, mjcf(floor=floor)), world={"incline": 3.0})
 
