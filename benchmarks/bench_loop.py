@@ -17,8 +17,8 @@ import mujoco
 import numpy as np
 from harness import main
 from mujoco.batch import Batch
-from pivoting.models import instrument, load
-from pivoting.models.scenes import TABLE
+from pivoting.models import load
+from pivoting.models.sensors import instrument
 from pivoting.sim import scenario, simulate
 from pivoting.sim.recording import record
 from pivoting.sim.run import Run
@@ -47,8 +47,7 @@ def bare(run: Run, steps: int) -> float:
 
 def fleet_model(run: Run) -> mujoco.MjModel:
     """The model that the loop steps, sensors included."""
-    spec = load(run.scenario.path, run.scenario.actual)
-    return instrument(spec, run.truth, TABLE, run.points)[0]
+    return instrument(load(run.scenario.path, run.scenario.actual))[0]
 
 
 def replay(run: Run) -> float:

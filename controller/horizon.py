@@ -22,6 +22,7 @@ from pivoting.controller.transcription import INTEGRATORS, Path, fill_start
 from pivoting.controller.validate import Array, array, fail, number, one_of, positive_definite, unit_quaternions
 
 EDGES = 16  # of the polygon in which a QP keeps a planar force: up to 1 - cos(pi / 16) = 2 % of a bound is unused
+OFF_PLANE = np.deg2rad(1.0)  # by which a measured state may be out of the plane
 
 
 class BodyState(NamedTuple):
@@ -135,6 +136,21 @@ class Horizon:
         if self.controller.space.dim == 2 and np.abs(orientation[..., 1::2]).max() > 1e-6:
             shown = quaternion_product(self.controller.base, orientation)
             raise fail(name, shown, "in the controller's plane, which its base gives")
+
+    def in_plane(self, state: BodyState) -> BodyState:
+        """A state that is measured: in the plane turned into it, as the per-step law sees it; else as it is.
+
+        Raises:
+            ValueError: it is more than `OFF_PLANE` out of the plane.
+        """
+        space = self.controller.space
+        if space.dim == 3:
+            return state
+        q = unit_quaternions("orientation", state.orientation, (4,))
+        off = 2.0 * float(np.linalg.norm(quaternion_product(self._to_table, q)[1::2]))
+        if off > OFF_PLANE:
+            raise fail("orientation", q, f"within {np.rad2deg(OFF_PLANE):g} deg of the controller's plane")
+        return state._replace(orientation=space.orientation(space.angle(q)))
 
     def height(self, state: BodyState) -> float:
         """How far the lowest of the `clear` points is above the lowest contact, over the lever; inf without any."""

@@ -63,10 +63,14 @@ class RecedingHorizon:
         Args:
             last: what was followed until now; None at first.
             applied: (nw,) wrench until now, for bounds on its rate.
+
+        Raises:
+            ValueError: in the plane, a state that is more than a degree out of it.
         """
         if last is not None and last.outcome == "released":
             return last
         horizon = self.planner.horizon
+        state = horizon.in_plane(state)
         desired = horizon.arc(orientations, state)
         attempt = None
         if last is not None and last.plan is not None and last.outcome == "planned":

@@ -4,24 +4,26 @@
 tilted about what; here is the order in which that is looked for.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, islice
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.models.faces import SLACK, Face, bends, cones, face, faces, middle, promising
+from pivoting.models.faces import faces, promising
 from pivoting.models.frames import Array, matrix
-from pivoting.models.given import ALLOWED, Shown, as_compiled, held_by_hand, written
-from pivoting.models.hull import TOLERANCE, Hull, Indices, read_hull
+from pivoting.models.given import Shown, as_compiled, held_by_hand, written
+from pivoting.models.grip import Grip
+from pivoting.models.hull import TOLERANCE, Hull, read_hull
 from pivoting.models.naming import ModelError
 from pivoting.models.refusal import named, no_contact, not_held, option, out_of_range, within
-from pivoting.models.tilt import LEAST, Arc, Held, Stance, interval, tilted, tilted_aside
+from pivoting.models.search import about, aside, held_at, of_no_face, on_face, search, spots, widest
+from pivoting.models.tilt import LEAST, Arc, Stance, interval
 
-NEARLY = 1e-3  # [rad]: closer normals are of one face
-Holds = Callable[[Stance], bool]  # whether the simulator holds an edge by contacts of its own
+TRIES = 400  # contacts among which a nearest one is looked for, or one beside which no other corner touches
+Gripped = Callable[[Stance], Grip]  # how the simulator holds it
 
 
 class Candidate(NamedTuple):
@@ -70,7 +72,7 @@ def stance(
     table: ArrayLike = (1.0, 0.0, 0.0, 0.0),
     *,
     arc: Arc | None = None,
-    holds: Holds | None = None,
+    gripped: Gripped | None = None,
     shown: Shown = as_compiled,
 ) -> Stance:
     """How to pivot a body about a contact.
@@ -92,7 +94,8 @@ def stance(
             corners lie on the face that the body has down in it, if they are of that.
         table: (4,) table frame (t, o, n) to world, that goes with it.
         arc: the angles that it has to allow; by default any range will do.
-        holds: whether the simulator holds an edge, see `models.grip`; by default it does.
+        gripped: how the simulator holds a contact, see `models.grip`, which prefers what is held firmly, and refuses
+            edges that are not; by default everything is.
         shown: points as the reader of a message has them, by default in the compiled body frame.
 
     Raises:
@@ -101,25 +104,25 @@ def stance(
     body, now = read_hull(model, body_index), None
     if xquat is not None or (isinstance(contact, str) and contact == "lowest"):
         now = matrix(np.asarray(table)).T @ matrix(np.asarray(model.body_quat[body_index] if xquat is None else xquat))
-    loose, reason = None, ""  # an edge that allows the arc and is not held
+    one = alternating = None
+    reason = ""
     try:
-        for one in _search(body, contact, arc, now, shown):
-            if holds is None or holds(one):
-                return replace(one, face=_down(body, one))
-            loose = loose or one
+        one, alternating = _chosen(search(body, contact, arc, now, shown), gripped)
     except ModelError as error:
         if not isinstance(contact, str) or contact != "lowest":
             raise
         reason = str(error)
+    if one is not None:
+        return replace(one, face=_down(body, one))
     if not reason:
-        first = next(_search(body, contact, None, now, shown), None)
-        if loose is not None:
-            reason = not_held(body, contact, loose, shown)
+        first = next(search(body, contact, None, now, shown), None)
+        if alternating is not None:
+            reason = not_held(body, contact, alternating, shown)
         elif first is not None and arc is not None:
             reason = out_of_range(body, contact, first.held, first.up, first.range[1], arc, shown)
         else:
             reason = no_contact(body, contact, shown)
-    raise ModelError(reason + _way_out(body, contact, arc, now, holds, shown))
+    raise ModelError(reason + _way_out(body, contact, arc, now, gripped, shown))
 
 
 def contacts(
@@ -127,33 +130,41 @@ def contacts(
     body_index: int,
     least: float = LEAST,
     *,
-    holds: Holds | None = None,
+    gripped: Gripped | None = None,
     shown: Shown = as_compiled,
 ) -> list[Candidate]:
     """All that a body may be pivoted about with a range of at least `least` [rad], face by face as `stance` looks.
 
-    A contact is listed again if on a later face, or about another axis, its range is longer.
+    A contact is listed again if on a later face its range is longer.
 
     Raises:
         ModelError: the body's shape cannot be served.
     """
     body = read_hull(model, body_index)
     met = list(faces(body, promising(body, "vertex", least) | promising(body, "edge", least)))
-    ups = np.array([one.up for one in met]).reshape(-1, 3)
     longest: dict[str, float] = {}
-    found = []
-    for kind in ("edge", "vertex"):
-        for one in _tilts(body, kind, least, met):
+    found: list[Candidate] = []
+
+    def listed(some: Iterable[Stance], lies: int | None) -> None:
+        for one in some:
             contact = written(one.points, shown)
-            if not max(least, longest.get(contact, 0.0) + 1e-6) <= one.range[1] or not (holds is None or holds(one)):
+            if one.range[1] < max(least, longest.get(contact, 0.0) + 1e-6):
                 continue
-            longest[contact] = one.range[1]
-            away = np.linalg.norm(ups - one.rotation[2], axis=1)
-            lies = int(away.argmin()) if away.min(initial=np.inf) <= NEARLY else None
-            rank = int(body.rank[one.owner[0]])
-            name = "edge" if kind == "edge" else "round end" if one.radius[0] else "rim" if rank == 2 else "vertex"
-            found.append(Candidate(name, contact, one, lies))
-    return sorted(found, key=lambda one: len(met) if one.face is None else one.face)
+            if gripped is None or gripped(one) is not Grip.ALTERNATING:
+                longest[contact] = one.range[1]
+                found.append(Candidate(_kind(body, one), contact, one, lies))
+
+    for number, on in enumerate(met):
+        for kind in ("edge", "vertex"):
+            listed(on_face(body, on, kind, least), number)
+    for number, on in enumerate(met):  # about other axes, if about that towards the CoM it is no candidate
+        new = (held for held in spots(body, on, least) if written(held.points, shown) not in longest)
+        listed(aside(body, new, on.up, least), number)
+    for kind in ("edge", "vertex"):
+        for held, up in of_no_face(body, kind, least):
+            if written(held.points, shown) not in longest:
+                listed(about(body, held, up, least), None)
+    return found
 
 
 def planar_stance(
@@ -181,7 +192,7 @@ def planar_stance(
     if isinstance(contact, str):
         points, owner = body.touching(up)
         left = [int((points @ right).argmin())]
-        held = _held(body, points[left], owner[left], up)
+        held = held_at(body, points[left], owner[left], up)
     else:
         given = np.asarray(contact)
         projected = given @ flat if given.dtype.kind in "iuf" and given.shape[-1:] == (3,) else given
@@ -198,139 +209,25 @@ def planar_stance(
     return point, radius, high
 
 
-def _search(
-    body: Hull, contact: str | ArrayLike, arc: Arc | None, now: Array | None, shown: Shown = as_compiled
-) -> Iterator[Stance]:
-    """The contacts that are such and allow the arc, the first to be taken."""
-    least = LEAST if arc is None else max(LEAST, arc.least)
-    if not isinstance(contact, str):
-        found = _by_hand(body, held_by_hand(body, contact, shown), least, now)
-    elif contact == "lowest" and now is not None:
-        found = _lowest(body, least, now)
-    elif contact in ("vertex", "edge"):
-        found = _tilts(body, contact, least, faces(body, promising(body, contact, least)))
-    else:
-        raise ModelError(f"contact = {contact!r}: must be {ALLOWED}")
-    return (one for one in found if arc is None or arc.within(one.range[1]))
+def _chosen(found: Iterable[Stance], gripped: Gripped | None) -> tuple[Stance | None, Stance | None]:
+    """The first that is held firmly, or else somehow; and the first that is not held."""
+    crowded = alternating = None
+    for tried, one in enumerate(found):
+        how = Grip.FIRM if gripped is None else gripped(one)
+        if how is Grip.FIRM:
+            return one, alternating
+        crowded = crowded or (one if how is Grip.CROWDED else None)
+        alternating = alternating or (one if how is Grip.ALTERNATING else None)
+        if crowded is not None and tried >= TRIES:
+            break
+    return crowded, alternating
 
 
-def _tilts(body: Hull, kind: str, least: float, found: Iterable[Face]) -> Iterator[Stance]:
-    """About all edges, or vertices, of the hull: face by face, then vertices about other axes, then what is of no face.
-
-    Of those with a range of less than `least` [rad] some are left out.
-    """
-    met = []
-    for one in found:
-        met.append(one)
-        yield from _on_face(body, one, kind)
-    if kind == "vertex":
-        for one in met:
-            yield from _aside(body, one, least)
-    for held, up in _of_no_face(body, kind, least):
-        yield from _about(body, held, up, least)
-
-
-def _lowest(body: Hull, least: float, now: Array) -> Iterator[Stance]:
-    """About what touches the table, body to table axes `now` (3, 3): its edges, then its vertices."""
-    points, owner = body.support(now[2])
-    lies = face(body, now[2])
-    if lies is not None:
-        yield from chain(_on_face(body, lies, "edge", now), _on_face(body, lies, "vertex", now))
-        yield from _aside(body, lies, least, now)
-        return
-    for some in (range(len(points)), *([i] for i in range(len(points)) if len(points) > 1)):
-        yield from _about(body, _held(body, points[some], owner[some], now[2]), now[2], least, now)
-
-
-def _by_hand(body: Hull, held: Held, least: float, now: Array | None) -> Iterator[Stance]:
-    """About one contact: as the body stands, if it does so on a face of that, then on its faces, then otherwise."""
-    if now is not None and face(body, now[2]) is not None:
-        yield from filter(None, [tilted(body, held, now[2], now)])
-    met = []
-    for one in faces(body, body.facets_of(held.owner)):
-        met.append(one)
-        yield from filter(None, [tilted(body, held, one.up)])
-    for one in met:
-        yield from filter(None, [tilted_aside(body, held, one.up, least)])
-    for same, up in _of_no_face(body, "vertex" if len(held.points) == 1 else "edge", least, held.owner):
-        if np.linalg.norm(same.points - held.points) <= body.reach:
-            yield from _about(body, held, up, least)
-
-
-def _about(body: Hull, held: Held, up: Array, least: float, now: Array | None = None) -> Iterator[Stance]:
-    """About one contact on a table of normal `up`: as ever, then about another axis."""
-    yield from filter(None, [tilted(body, held, up, now), tilted_aside(body, held, up, least, now)])
-
-
-def _on_face(body: Hull, on: Face, kind: str, now: Array | None = None) -> list[Stance]:
-    """About the edges or vertices of a face, that to be taken first."""
-    if kind == "vertex":
-        some = [_held(body, on.points[[i]], on.owner[[i]], on.up) for i in on.around if body.rank[on.owner[i]] != 2]
-        rims, near = np.flatnonzero(body.rank == 2), body.rims(body.com)
-        for rim in (near, 2.0 * body.centre[rims] - near):
-            some += [Held(point[None], 0.0, rims[[k]]) for k, point in enumerate(rim)]
-    else:
-        pairs = np.stack([on.around, np.roll(on.around, -1)], axis=1)
-        some = [_edge(body, on, pair) for pair in pairs if _is_edge(body, on.owner[pair])]
-    found = [one for one in (tilted(body, held, on.up, now) for held in some) if one is not None]
-    return sorted(
-        found,
-        key=lambda one: (one.balance >= one.range[1], round(one.balance, 6), *np.round(one.points.mean(axis=0), 9)),
-    )
-
-
-def _aside(body: Hull, on: Face, least: float, now: Array | None = None) -> Iterator[Stance]:
-    """About the vertices of a face about other axes, and about any point of its rims."""
-    for i in on.around:
-        held = _held(body, on.points[[i]], on.owner[[i]], on.up)
-        rim = body.rank[on.owner[i]] == 2
-        one = tilted(body, held, on.up, now) if rim else tilted_aside(body, held, on.up, least, now)
-        if one is not None:
-            yield one
-
-
-def _of_no_face(body: Hull, kind: str, least: float, of: Indices | None = None) -> Iterator[tuple[Held, Array]]:
-    """Edges or vertices of the hull, each with a normal of a table on which it stands on that alone, CoM lowest first.
-
-    They are of two corners, or of a corner, ball or rim, all of them or those `of` some ellipsoids.
-    """
-    some: list[tuple[Indices, Array]] = []
-    if kind == "edge":
-        for f, k in np.argwhere((bends(body) >= SLACK * least) & (np.arange(len(body.ups))[:, None] < body.beside)):
-            pair = np.delete(body.facets[f], k)
-            if pair[0] != pair[1] and not body.rank[pair].any() and (of is None or set(of) == set(pair)):
-                some.append((pair, middle(body, np.array([f, body.beside[f, k]]))))
-    else:
-        tips = np.flatnonzero(((body.rank == 0) & (cones(body) >= SLACK * least)) | (body.radius > 0.0))
-        tips = tips if of is None else np.intersect1d(tips, of)
-        some = [(tip, middle(body, body.facets_of(tip))) for tip in tips[:, None]]
-    found = [(_held(body, body.lowest(up, which), which, up), up) for which, up in some]
-    rims = np.flatnonzero(body.rank == 2) if kind == "vertex" else np.array([], dtype=int)
-    for rim, near in zip(rims, body.rims(body.com), strict=False):
-        for point in (near, 2.0 * body.centre[rim] - near):
-            up = (body.centre[rim] - point) / np.linalg.norm(body.centre[rim] - point)
-            found.append((Held(point[None], 0.0, np.array([rim])), up))
-    height = [float((body.com - held.points[0]) @ up) for held, up in found]
-    yield from (found[k] for k in np.argsort(height, kind="stable"))
-
-
-def _held(body: Hull, points: Array, owner: Indices, up: Array) -> Held:
-    """What stays put of `points` (K, 3) on a table of normal `up`: they, or of a ball its centre; and its radius."""
-    return Held(points + body.radius[owner, None] * up, float(body.radius[owner].max()), owner)
-
-
-def _is_edge(body: Hull, ends: Indices) -> bool:
-    """Whether it turns about the line between two, and does not roll on a ball."""
-    return bool(ends[0] != ends[1] and not body.radius[ends].any())
-
-
-def _edge(body: Hull, on: Face, pair: Indices) -> Held:
-    """Two of the points around a face; moved, if they are of rims, to where their line is a tangent."""
-    ends, owner = on.points[pair], on.owner[pair]
-    up = np.cross(ends[1] - ends[0], on.points.mean(axis=0) - ends[0])
-    for _ in range(50 if body.rank[owner].any() else 1):
-        ends = body.lowest(np.cross(up, ends[1] - ends[0]), owner)
-    return Held(ends, 0.0, owner)
+def _kind(body: Hull, one: Stance) -> str:
+    """What a contact is called."""
+    if len(one.points) == 2:
+        return "edge"
+    return "round end" if one.radius[0] > 0.0 else "rim" if body.rank[one.owner[0]] == 2 else "vertex"
 
 
 def _down(body: Hull, one: Stance) -> Array:
@@ -344,25 +241,22 @@ def _down(body: Hull, one: Stance) -> Array:
 
 
 def _way_out(
-    body: Hull, contact: str | ArrayLike, arc: Arc | None, now: Array | None, holds: Holds | None, shown: Shown
+    body: Hull, contact: str | ArrayLike, arc: Arc | None, now: Array | None, gripped: Gripped | None, shown: Shown
 ) -> str:
-    """The nearest contact that would do, or else the first with half the range or more, as the end of a message."""
+    """The nearest contact that would do, or else the one with the widest range, as the end of a message."""
     asked = arc or Arc(0.0, 0.0)
-    for part in 0.5 ** np.arange(8):
-        less = (
-            None if arc is None else arc if part == 1.0 else Arc(0.0, part * arc.least - arc.gap, arc.gap, lands=True)
+    kinds = [kind for kind in ("edge", "vertex") if contact is not kind]
+    some: Iterable[Stance] = chain(*(search(body, kind, arc, now) for kind in kinds))
+    if not isinstance(contact, str):
+        at = np.atleast_2d(np.asarray(contact, dtype=float)).mean(axis=0)
+        some = sorted(islice(some, TRIES), key=lambda one: float(np.linalg.norm(one.points.mean(axis=0) - at)))
+    one = _chosen(some, gripped)[0]
+    if one is not None:
+        value = (
+            written(one.points, shown) if not isinstance(contact, str) else "vertex" if len(one.points) == 1 else "edge"
         )
-        kinds = [kind for kind in ("edge", "vertex") if part < 1.0 or contact is not kind]
-        some = (one for kind in kinds for one in _search(body, kind, less, now) if holds is None or holds(one))
-        if isinstance(contact, str):
-            one = next(some, None)
-        else:
-            at = np.atleast_2d(np.asarray(contact, dtype=float)).mean(axis=0)
-            one = min(some, key=lambda one: float(np.linalg.norm(one.points.mean(axis=0) - at)), default=None)
-        if one is not None:
-            word = "vertex" if len(one.points) == 1 else "edge"
-            value = word if part == 1.0 and isinstance(contact, str) else written(one.points, shown)
-            return f"; nearest: {option(value)}, within {within(asked, one.range[1])}"
-        if less is None or less.least < LEAST:
-            break
+        return f"; nearest: {option(value)}, within {within(asked, one.range[1])}"
+    one = _chosen(sorted(widest(body), key=lambda one: -one.range[1]), gripped)[0]
+    if one is not None:
+        return f"; widest: {option(written(one.points, shown))}, within {within(asked, one.range[1])}"
     return ""

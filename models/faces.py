@@ -59,32 +59,20 @@ def promising(body: Hull, kind: str, least: float) -> NDArray[np.bool_]:
     """(F,) which facets may have a "vertex" or an "edge" with a range of at least `least` [rad]; no other has.
 
     The table's normals about a vertex of the hull are a cone that ends at the normals of its facets, and about an edge
-    an arc between two; a hull of samples has the wider ones. All facets of what is round are promising.
+    an arc between two; a hull of samples has the wider ones. Facets of what is round are promising.
     """
-    room = bends(body) if kind == "edge" else cones(body)[body.facets]
-    return np.any((body.rank[body.facets] > 0) | (room >= SLACK * least), axis=1)
+    if kind == "vertex":
+        return np.any((body.rank[body.facets] > 0) | (body.cones[body.facets] >= SLACK * least), axis=1)
+    one, other = body.facets[:, [1, 2, 0]], body.facets[:, [2, 0, 1]]  # the ends of the edge across from each
+    turns = (one != other) & (body.radius[one] == 0.0) & (body.radius[other] == 0.0)
+    rims = (body.rank[one] > 0) | (body.rank[other] > 0)
+    return np.any(turns & (rims | (body.bends >= SLACK * least)), axis=1)
 
 
 def middle(body: Hull, facets: Indices) -> Array:
     """(3,) the normal in the middle of some facets' normals."""
     total = body.ups[facets].sum(axis=0)
     return total / max(float(np.linalg.norm(total)), 1e-300)
-
-
-def bends(body: Hull) -> Array:
-    """(F, 3) the angle from each facet to the one across each of its edges [rad]."""
-    apart = np.linalg.norm(body.ups[:, None] - body.ups[body.beside], axis=2)
-    return 2.0 * np.arcsin(np.minimum(0.5 * apart, 1.0))
-
-
-def cones(body: Hull) -> Array:
-    """(N,) bound on the angle between any two normals of a table on which each can stand [rad]."""
-    total, away = np.zeros((len(body.centre), 3)), np.zeros(len(body.centre))
-    np.add.at(total, body.facets, body.ups[:, None])
-    total /= np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
-    apart = np.linalg.norm(body.ups[:, None] - total[body.facets], axis=2)
-    np.maximum.at(away, body.facets, 2.0 * np.arcsin(np.minimum(0.5 * apart, 1.0)))
-    return 2.0 * away
 
 
 def _planes(body: Hull, some: Indices) -> tuple[Array, Array]:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.models.naming import ModelError, label
+from pivoting.models.naming import ModelError, body_name, label
 
 Array = NDArray[np.float64]
 OBJ = mujoco.mjtObj
@@ -20,12 +20,15 @@ class JointDrag(NamedTuple):
         friction: (n,) greatest dry friction [N, N m].
         anchor: (3,) the point of the body whose velocity the translations are, body frame [m].
         slides: (2, 3) axes of the two slides of a planar body, world axes; (0, 3) for a free joint.
+        ahead: of the time to which the velocity belongs that MuJoCo damps: a time step where it integrates damping
+            implicitly, else 0 [s].
     """
 
     damping: Array
     friction: Array
     anchor: Array
     slides: Array
+    ahead: float
 
 
 def refuse_unknown_forces(model: mujoco.MjModel, body: int, support: int) -> None:
@@ -34,8 +37,9 @@ def refuse_unknown_forces(model: mujoco.MjModel, body: int, support: int) -> Non
     Raises:
         ModelError: something else acts on the body; it is named.
     """
-    name = model.body(body).name
-    for what in unknown_forces(model, body, support):
+    name = body_name(model, body)
+    what = "; ".join(unknown_forces(model, body, support))
+    if what:
         raise ModelError(f"body = {name!r}: {what}; the controller does not know of it: must be taken out of the model")
 
 
@@ -49,9 +53,9 @@ def unknown_forces(model: mujoco.MjModel, body: int, support: int) -> Iterator[s
     if not _off(model, "EQUALITY"):
         yield from _constraints(model, body, joints, tendons)
     if not _off(model, "ACTUATION"):
-        yield from _actuators(model, body, joints, tendons)
+        yield from _actuators(model, body, support, joints, tendons)
     for tendon in sorted(tendons):
-        attributes = ("stiffness", "damping", "frictionloss", "limited", "armature")
+        attributes = ("stiffness", "stiffnesspoly", "damping", "dampingpoly", "frictionloss", "limited", "armature")
         pulls = [key for key in attributes if np.any(getattr(model, f"tendon_{key}")[tendon])]
         if pulls:
             yield f"tendon {_called(model, OBJ.mjOBJ_TENDON, tendon)} pulls on it ({', '.join(pulls)})"
@@ -61,7 +65,8 @@ def _of_the_surroundings(model: mujoco.MjModel, body: int, support: int) -> Iter
     opt = model.opt
     if opt.density > 0.0 or opt.viscosity > 0.0:
         wind = f", wind = {np.array(opt.wind).tolist()}" if np.any(opt.wind) else ""
-        yield f"a fluid acts on it (density = {opt.density:g}, viscosity = {opt.viscosity:g}{wind})"
+        out = '<option density="0" viscosity="0"/> takes it away'
+        yield f"a fluid acts on it (density = {opt.density:g}, viscosity = {opt.viscosity:g}{wind}; {out})"
     if model.body_gravcomp[body] != 0.0:
         yield f"it has gravcomp = {model.body_gravcomp[body]:g}"
     own = range(int(model.body_geomadr[body]), int(model.body_geomadr[body] + model.body_geomnum[body]))
@@ -114,7 +119,7 @@ def _constraints(model: mujoco.MjModel, body: int, joints: set[int], tendons: se
             yield f"the equality constraint {_called(model, OBJ.mjOBJ_EQUALITY, eq)} ({kind}) holds it"
 
 
-def _actuators(model: mujoco.MjModel, body: int, joints: set[int], tendons: set[int]) -> Iterator[str]:
+def _actuators(model: mujoco.MjModel, body: int, support: int, joints: set[int], tendons: set[int]) -> Iterator[str]:
     kinds = mujoco.mjtTrn
     sites = set(np.flatnonzero(model.site_bodyid == body).tolist())
     what = {
@@ -123,7 +128,7 @@ def _actuators(model: mujoco.MjModel, body: int, joints: set[int], tendons: set[
         int(kinds.mjTRN_TENDON): tendons,
         int(kinds.mjTRN_SITE): sites,
         int(kinds.mjTRN_SLIDERCRANK): sites,
-        int(kinds.mjTRN_BODY): {body},
+        int(kinds.mjTRN_BODY): {body, int(model.geom_bodyid[support])},  # adhesion, of either
     }
     for actuator in range(len(model.actuator_trntype)):
         ends = {int(end) for end in np.ravel(model.actuator_trnid[actuator])}
@@ -163,8 +168,10 @@ def read_drag(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> JointDra
     friction = np.array(model.dof_frictionloss[dof : dof + count]) * (not _off(model, "FRICTIONLOSS"))
     if not (damping.any() or friction.any()):
         return None
-    joint = int(model.body_jntadr[body])
+    joint, kinds = int(model.body_jntadr[body]), mujoco.mjtIntegrator
+    explicit = {int(kinds.mjINT_RK4): True, int(kinds.mjINT_EULER): _off(model, "EULERDAMP")}
+    ahead = 0.0 if explicit.get(int(model.opt.integrator), False) else float(model.opt.timestep)
     if count == 6:
-        return JointDrag(damping, friction, np.zeros(3), np.zeros((0, 3)))
+        return JointDrag(damping, friction, np.zeros(3), np.zeros((0, 3)), ahead)
     slides = np.array(data.xaxis[joint : joint + 2])
-    return JointDrag(damping, friction, np.array(model.jnt_pos[joint + 2]), slides)
+    return JointDrag(damping, friction, np.array(model.jnt_pos[joint + 2]), slides, ahead)

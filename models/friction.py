@@ -10,6 +10,7 @@ from pivoting.models.naming import ModelError, label
 from pivoting.models.supports import body_size, can_collide
 
 LEAST = 1e-5  # MuJoCo's own least friction, mjMINMU: a coefficient of 0 counts as this
+EDGE = 65  # points along an edge at which rims and round ends are looked for
 NEAR = 1e-3  # of the body's size: a geom whose surface is closer to a contact point carries it
 
 
@@ -65,20 +66,22 @@ def read_friction(model: mujoco.MjModel, body: int, support: int, points: ArrayL
 
 
 def _near(model: mujoco.MjModel, geoms: Iterable[int], points: np.ndarray) -> list[int]:
-    """Those of the geoms whose corners, rims or round ends are at one of the points (K, 3), or that hold one inside."""
+    """Those of the geoms that come to one of the points (K, 3), or to the edge between two of them."""
     owner, centre, axes = ellipsoids(model, list(geoms))
     half = np.linalg.norm(axes, axis=1)
-    size, there = body_size(model, int(model.geom_bodyid[owner[0]])), set()
-    for point in points:
-        away = np.linalg.norm(centre - point, axis=1)
-        wide = np.flatnonzero(half.any(axis=1))
-        inside = away <= NEAR * size
-        for i in wide:
-            used = half[i] > 0.0
-            unit = axes[i][:, used] / half[i][used]
-            along = (point - centre[i]) @ unit
-            off = float(np.linalg.norm(point - centre[i] - unit @ along))
-            round_ = abs(float(np.linalg.norm(along / half[i][used])) - 1.0) * float(half[i][used].min())
-            inside[i] |= np.hypot(off, round_) <= NEAR * size
-        there |= {int(geom) for geom in owner[inside]}
-    return sorted(there)
+    reach = NEAR * body_size(model, int(model.geom_bodyid[owner[0]]))
+    along = np.linspace(0.0, 1.0, EDGE if len(points) == 2 else 1)[:, None]
+    spots = points[0] + along * (points[-1] - points[0]) if len(points) <= 2 else points
+    direction = points[-1] - points[0]
+    share = np.clip((centre - points[0]) @ direction / max(float(direction @ direction), 1e-300), 0.0, 1.0)
+    there = np.linalg.norm(centre - points[0] - share[:, None] * direction, axis=1) <= reach
+    if len(points) > 2:
+        there = (np.linalg.norm(centre[:, None] - points, axis=2) <= reach).any(axis=1)
+    for i in np.flatnonzero(half.any(axis=1)):
+        used = half[i] > 0.0
+        unit = axes[i][:, used] / half[i][used]
+        off = (spots - centre[i]) @ unit
+        away = np.linalg.norm(spots - centre[i] - off @ unit.T, axis=1)
+        rim = np.abs(np.linalg.norm(off / half[i][used], axis=1) - 1.0) * float(half[i][used].min())
+        there[i] |= bool((np.hypot(away, rim) <= reach).any())
+    return sorted({int(geom) for geom in owner[there]})

@@ -1,60 +1,89 @@
-"""Whether the simulator holds an edge by contacts along it, or by one at a time, which jumps between its ends.
+"""Whether the simulator holds a contact: an edge by contacts along it, and with nothing else touching.
 
-Of a mesh on a plane MuJoCo makes few contacts and leaves out those that are close to another, by rules that change with
-its version: 3.12 kept three, 0.3 of the geom's bounding radius from the deepest, 4.0 keeps four. Therefore it is asked,
-with the edge pressed a little into the table.
+Of a mesh on a plane MuJoCo makes few contacts, by rules that change with its version: 3.12 keeps three that are not
+close to the deepest, 4.0 keeps four of that face of the mesh which is turned down most. An edge that it holds at one
+end at a time alternates between the two. And as its contacts are soft, corners that are close by touch before the
+body's shape has them do so. Therefore it is asked, with the body pressed in as far as the load does.
 """
 
 import copy
 from collections.abc import Callable
+from enum import Enum
 
 import mujoco
 import numpy as np
+from pivoting.models.contact_rows import read_rows
 from pivoting.models.frames import Array, matrix, quaternion
+from pivoting.models.given import NEAR
 from pivoting.models.reading import RigidBody, initial_data, place
-from pivoting.models.tilt import Stance
+from pivoting.models.supports import body_size
+from pivoting.models.tilt import Arc, Stance
 
-DEPTH = 1e-5  # of the lever to the CoM, that an edge's middle is pressed in
-LEANING = 0.3  # share of that by which one end is deeper and the other less deep
+PROBE = 1e-5  # of the body's size, how deep it is to make any contact
+LOAD = 0.5  # of the weight, which the smallest wrench leaves to the contact
+LEANING = 0.3  # share of the depth by which one end of an edge is deeper and the other less deep
 APART = 0.3  # of an edge's length: closer contacts do not hold it
+ANGLES = 5  # of an arc, or a range, at which it is asked
 
 
-def holds(model: mujoco.MjModel, body: RigidBody) -> Callable[[Stance], bool]:
-    """What says of a stance whether two contacts hold its edge when one end is the deeper one; one point always holds.
+class Grip(Enum):
+    """How the simulator holds a contact: an edge with two contacts, whichever of its ends is the deeper one; with other
+    corners that touch as well, as the contact is soft; or an edge with one contact at a time."""
+
+    FIRM = "firm"
+    CROWDED = "crowded"
+    ALTERNATING = "alternating"
+
+
+def grip(model: mujoco.MjModel, body: RigidBody, arc: Arc | None = None) -> Callable[[Stance], Grip]:
+    """What says of a stance how it is held.
 
     Args:
         model: of the body; it is not changed.
         body: that moves freely.
+        arc: over which they have to; by default over all of a stance's range.
     """
     model, data, table = copy.copy(model), initial_data(model), matrix(body.table)
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE  # it misses contacts of less than 1e-6 m
-    turned, origin = data.xmat[body.index].reshape(3, 3).copy(), data.xpos[body.index].copy()
+    turned, origin = data.xmat[body.index].reshape(3, 3).copy(), data.xpos[body.index].copy() - body.origin
+    size, load = body_size(model, body.index), LOAD * body.mass * float(np.linalg.norm(body.gravity))
 
-    def held(stance: Stance) -> bool:
-        middle, along = stance.points.mean(axis=0), stance.points[-1] - stance.points[0]
-        length, depth = float(np.linalg.norm(along)), DEPTH * float(np.linalg.norm(body.com - middle))
-        if length == 0.0:
-            return True
-        away = origin + turned @ middle - body.origin  # where the file has it, as far as the table goes
-        at = body.origin + away - (away @ table[:, 2] + depth) * table[:, 2]
-        level = _rotation(stance.axis, 0.5 * stance.range[1]) @ stance.rotation
-        across = np.cross([0.0, 0.0, 1.0], level @ along / length)
-        for leaning in (-LEANING, LEANING):
-            leant = _rotation(across, np.arctan(2.0 * leaning * depth / length)) @ level
-            place(model, data, body, quaternion(table @ leant), middle, at)
-            mujoco.mj_collision(model, data)
-            at_edge = _touching(model, data, body) @ along
-            if len(at_edge) > 1 and at_edge.max() - at_edge.min() >= APART * length**2:
-                return True
-        return False
+    def touching(stance: Stance, theta: float, depth: float, leaning: float = 0.0) -> tuple[Array, Array]:
+        """(C,) where along the edge, of its length, contacts are, and (C,) how far from it [m]."""
+        first, along = stance.points[0], stance.points[-1] - stance.points[0]
+        level = _rotation(stance.axis, theta) @ stance.rotation
+        away = origin + turned @ first  # where the file has it, as far as the table goes
+        at = body.origin + away + table @ level @ (0.5 * along)
+        at = at + (stance.radius[0] - depth - (at - body.origin) @ table[:, 2]) * table[:, 2]
+        length = float(np.linalg.norm(along))
+        if leaning:
+            across = np.cross([0.0, 0.0, 1.0], level @ along / length)
+            level = _rotation(across, np.arctan(2.0 * leaning * depth / length)) @ level
+        place(model, data, body, quaternion(table @ level), first + 0.5 * along, at)
+        mujoco.mj_collision(model, data)
+        ours = (c for c in data.contact if body.support in c.geom and body.index in model.geom_bodyid[c.geom])
+        found = [c.pos for c in ours if c.dist < 0.0]
+        points = (np.reshape(found, (-1, 3)) - data.xpos[body.index]) @ data.xmat[body.index].reshape(3, 3)
+        points = points + stance.radius[0] * stance.up(theta) - first
+        share = np.clip(points @ along / max(length**2, 1e-300), 0.0, 1.0)
+        return share, np.linalg.norm(points - share[:, None] * along, axis=1)
+
+    def held(stance: Stance) -> Grip:
+        ends = (0.02 * stance.range[1], 0.98 * stance.range[1])
+        if arc is not None:
+            ends = (max(min(arc.theta, arc.theta_end), ends[0]), max(arc.theta, arc.theta_end))
+        touching(stance, ends[1], PROBE * size)
+        rows = read_rows(model, body.index, body.support, [data.qpos])
+        depth = max(PROBE * size, 0.0 if rows is None else float(rows.depth(load)))
+        edge, crowded = len(stance.points) == 2, False
+        for theta in np.linspace(*ends, ANGLES):
+            found = [touching(stance, theta, depth, leaning) for leaning in ((-LEANING, LEANING) if edge else (0.0,))]
+            if edge and max(share.max(initial=0.0) - share.min(initial=1.0) for share, _ in found) < APART:
+                return Grip.ALTERNATING
+            crowded |= max(off.max(initial=0.0) for _, off in found) > NEAR * size
+        return Grip.CROWDED if crowded else Grip.FIRM
 
     return held
-
-
-def _touching(model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody) -> Array:
-    """(C, 3) where the body touches its support, body frame [m]."""
-    found = [c.pos for c in data.contact if body.support in c.geom and body.index in model.geom_bodyid[c.geom]]
-    return (np.reshape(found, (-1, 3)) - data.xpos[body.index]) @ data.xmat[body.index].reshape(3, 3)
 
 
 def _rotation(axis: Array, angle: float) -> Array:

@@ -7,13 +7,14 @@ closed form.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.models.frames import Array, matrix
-from pivoting.models.naming import ModelError, label
+from pivoting.models.naming import ModelError, body_name, label
 from scipy.spatial import ConvexHull, QhullError
 
 Indices = NDArray[np.int64]
@@ -64,9 +65,14 @@ class Hull:
     size: float
     reach: float
 
+    @cached_property
+    def wide(self) -> Indices:
+        """Which are no corners."""
+        return np.flatnonzero(self.rank > 0)
+
     def least(self, up: Array) -> Array:
         """(N,) how far each reaches down along `up` (3,) [m]."""
-        least, wide = self.centre @ up, self.rank > 0
+        least, wide = self.centre @ up, self.wide
         least[wide] -= np.linalg.norm(up @ self.axes[wide], axis=1)
         return least
 
@@ -108,9 +114,47 @@ class Hull:
         """Whether on points of these it lies: on a face, or as a capsule does on a line, one end of which is a ball."""
         return len(owner) > 2 or (len(owner) == 2 and bool((self.radius[owner] > 0.0).any()))
 
+    @cached_property
+    def bends(self) -> Array:
+        """(F, 3) the angle from each facet to the one across each of its edges [rad]."""
+        apart = np.linalg.norm(self.ups[:, None] - self.ups[self.beside], axis=2)
+        return 2.0 * np.arcsin(np.minimum(0.5 * apart, 1.0))
+
+    @cached_property
+    def cones(self) -> Array:
+        """(N,) bound on the angle between any two normals of a table on which each touches [rad]."""
+        total, away = np.zeros((len(self.centre), 3)), np.zeros(len(self.centre))
+        np.add.at(total, self.facets, self.ups[:, None])
+        total /= np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
+        apart = np.linalg.norm(self.ups[:, None] - total[self.facets], axis=2)
+        np.maximum.at(away, self.facets, 2.0 * np.arcsin(np.minimum(0.5 * apart, 1.0)))
+        return 2.0 * away
+
+    @cached_property
+    def _folds(self) -> tuple[Indices, Array]:
+        """Edges between two ellipsoids each, as sorted numbers, and the angle by which the hull bends there [rad]."""
+        ends = np.sort(np.stack([self.facets[:, [1, 2, 0]], self.facets[:, [2, 0, 1]]]), axis=0)
+        numbers = (ends[0] * len(self.centre) + ends[1]).ravel()
+        order = np.argsort(numbers, kind="stable")
+        return numbers[order], self.bends.ravel()[order]
+
+    def fold(self, one: int, other: int) -> float:
+        """By how much the hull bends along the edge between two ellipsoids [rad]; 0 if there is none."""
+        numbers, bends = self._folds
+        number = min(one, other) * len(self.centre) + max(one, other)
+        return float(bends[slice(*np.searchsorted(numbers, [number, number + 1]))].max(initial=0.0))
+
+    @cached_property
+    def _facets_by_owner(self) -> tuple[Indices, Indices]:
+        """The facets in the order of whose they are, and where each ellipsoid's begin (N + 1,)."""
+        order = np.argsort(self.facets, axis=None, kind="stable")
+        starts = np.searchsorted(self.facets.ravel()[order], np.arange(len(self.centre) + 1))
+        return order // 3, starts
+
     def facets_of(self, which: Indices) -> Indices:
         """The facets that any of these ellipsoids is of."""
-        return np.flatnonzero(np.isin(self.facets, which).any(axis=1))
+        facets, starts = self._facets_by_owner
+        return np.unique(np.concatenate([facets[starts[i] : starts[i + 1]] for i in which]))
 
 
 def read_hull(model: mujoco.MjModel, index: int, tolerance: float = TOLERANCE) -> Hull:
@@ -123,7 +167,7 @@ def read_hull(model: mujoco.MjModel, index: int, tolerance: float = TOLERANCE) -
     Raises:
         ModelError: it has no colliding geom, one of a kind without a hull, or is one ball or ellipsoid.
     """
-    name, geoms = model.body(index).name, colliding(model, index)
+    name, geoms = body_name(model, index), colliding(model, index)
     if not geoms:
         raise ModelError(f"body = {name!r}: it has no colliding geom; must have one with contype, conaffinity or pair")
     geom, centre, axes = ellipsoids(model, geoms)

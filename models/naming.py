@@ -7,16 +7,26 @@ class ModelError(ValueError):
     """A model, or a body in it, that cannot be served; the message says why and what would be."""
 
 
+def body_name(model: mujoco.MjModel, body: int) -> str:
+    """The body's name, or '#id'."""
+    return model.body(body).name or f"#{body}"
+
+
+def geom_name(model: mujoco.MjModel, geom: int) -> str:
+    """The geom's name, or '#id'; as --support takes it."""
+    return model.geom(geom).name or f"#{geom}"
+
+
 def body_id(model: mujoco.MjModel, name: str) -> int:
     """Id of the body called `name`, or with the id that '#id' gives.
 
     Raises:
         ModelError: there is none; those that there are are listed.
     """
-    bodies = {model.body(i).name or f"#{i}": i for i in range(1, model.nbody)}
+    bodies = {body_name(model, i): i for i in range(1, model.nbody)}
     bodies |= {f"#{i}": i for i in range(1, model.nbody) if f"#{i}" not in bodies}
     if name not in bodies:
-        shown = ", ".join(repr(model.body(i).name or f"#{i}") for i in range(1, model.nbody))
+        shown = ", ".join(repr(body_name(model, i)) for i in range(1, model.nbody))
         raise ModelError(f"body = {name!r}: must be one of {shown or '(the model has none)'}")
     return bodies[name]
 
@@ -43,4 +53,4 @@ def label(model: mujoco.MjModel, geom: int) -> str:
         return repr(name)
     kind = mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
     body = int(model.geom_bodyid[geom])
-    return f"{name or f'#{geom}'!r} ({kind} of {f'body {model.body(body).name!r}' if body else 'the world'})"
+    return f"{name or f'#{geom}'!r} ({kind} of {f'body {body_name(model, body)!r}' if body else 'the world'})"

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pivoting.models.forces import JointDrag, read_drag, refuse_unknown_forces
 from pivoting.models.frames import Array, matrix, quaternion
-from pivoting.models.naming import ModelError, body_id
+from pivoting.models.naming import ModelError, body_id, body_name
 from pivoting.models.supports import Surface, find_support, support_surface
 
 PLANAR_JOINTS = "two perpendicular slides and then a hinge about their normal"
@@ -118,7 +118,7 @@ def read_body(model: mujoco.MjModel, name: str, support: str | None = None) -> R
     inertial = matrix(model.body_iquat[index])
     tensor = inertial @ np.diag(model.body_inertia[index]) @ inertial.T
     return RigidBody(
-        name=model.body(index).name or f"#{index}",
+        name=body_name(model, index),
         index=index,
         dim=dim,
         mass=float(model.body_mass[index]),
@@ -149,7 +149,7 @@ def degrees_of_freedom(model: mujoco.MjModel, index: int) -> int:
     Raises:
         ModelError: it moves otherwise, or hangs on another.
     """
-    name = model.body(index).name or f"#{index}"
+    name = body_name(model, index)
     joints = range(model.body_jntadr[index], model.body_jntadr[index] + model.body_jntnum[index])
     kinds = [int(model.jnt_type[j]) for j in joints]
     slide, hinge, free = (int(getattr(mujoco.mjtJoint, f"mjJNT_{kind}")) for kind in ("SLIDE", "HINGE", "FREE"))

@@ -48,7 +48,7 @@ def out_of_range(
     wanted = sorted((arc.theta, arc.theta_end))
     point, which = next_touch(body, held, up(0.0 if wanted[0] < low <= wanted[1] <= high else most))
     kind = "corner" if body.rank[which] == 0 else "point"
-    end = f" and theta_end = {np.rad2deg(arc.theta_end):g}" * (arc.theta_end != arc.theta)
+    end = f" and theta_end = {np.rad2deg(arc.theta_end):g}" * bool(arc.theta_end != arc.theta)
     asked = f"theta = {np.rad2deg(arc.theta):g}{end} deg"
     about = f"about {written(held.points, shown)} " * isinstance(contact, str)
     touches = f"then the {kind} {written(point, shown)} of geom {body.label[int(body.geom[which])]} touches the table"
@@ -69,4 +69,4 @@ def not_held(body: Hull, contact: str | ArrayLike, edge: Stance, shown: Shown = 
     what = (
         f"the edge {written(edge.points, shown)} of geom {whose}, {length:.3g} m long, is held by one contact at a time"
     )
-    return f"{named(contact, shown)}: {what}, as MuJoCo makes few of a mesh, and none close to another"
+    return f"{named(contact, shown)}: {what}, as MuJoCo makes few contacts of such geoms, and none close to another"

@@ -1,5 +1,6 @@
 """Scenes: an MJCF file with a body to be pivoted, and what is changed of it."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,11 +10,11 @@ import mujoco
 import numpy as np
 from pivoting.models.contact_settings import STIFF, ContactSettings
 from pivoting.models.frames import Array
-from pivoting.models.friction import contact_friction, read_friction
-from pivoting.models.naming import ModelError, body_id
+from pivoting.models.lengths import length_unit
+from pivoting.models.naming import ModelError, body_id, body_name
 from pivoting.models.reading import FILE_FRAME, degrees_of_freedom, initial_data
 from pivoting.models.solver_settings import choose
-from pivoting.models.supports import can_collide, find_support
+from pivoting.models.supports import find_support
 
 BODY, TABLE = "block", "table"  # names in the scenes
 WORLD_KEYS = ("mu", "mass", "size", "incline", "gravity", "dt", "timeconst", "impedance", "impratio")
@@ -37,6 +38,9 @@ class Scene:
         mass: of the body [kg], if it is changed.
         scale: by which its size is changed.
         replaced: what of the file gave way to the settings of the shipped scenes, in words: what it was.
+        unit: of the file's lengths [m], see `lengths.length_unit`.
+        warned: what MuJoCo had to say of the file when it read it.
+        read: the model of the file as it is, but for names and what is fused into the body.
     """
 
     spec: mujoco.MjSpec
@@ -46,6 +50,9 @@ class Scene:
     mass: float | None
     scale: float
     replaced: tuple[tuple[str, str], ...]
+    unit: float
+    warned: tuple[str, ...]
+    read: mujoco.MjModel
 
     def compile(self) -> mujoco.MjModel:
         """The model.
@@ -54,7 +61,9 @@ class Scene:
             ModelError: MuJoCo does not compile it, for the reason that it gives.
         """
         try:
-            model = self.spec.compile()
+            with warnings.catch_warnings():  # `warned` has them
+                warnings.simplefilter("ignore", UserWarning)
+                model = self.spec.compile()
         except ValueError as error:
             raise ModelError(f"model = {str(self.path)!r}: MuJoCo cannot compile it ({error})") from None
         if self.mass is not None:  # of whatever the file derives it from: geoms, <inertial>, settotalmass
@@ -70,26 +79,28 @@ class Scene:
 
         mu: sliding friction of the body and its support. mass [kg]: of the body, its inertia in proportion. size [m]
         (the longest side): of a body of one box. incline [deg]: the support rises to the right. gravity [m/s^2]: its
-        magnitude, along the file's direction. dt [s]: the time step; the contacts' time constant stays 2.1 dt unless
-        `timeconst` [s] is given. impedance: the constant solimp. impratio: the option.
+        magnitude, along the file's direction. Lengths are in m whatever the file's unit is. dt [s]: the time step.
+        timeconst [s], impedance: of the contacts; with the settings of the shipped scenes the former is 2.1 dt unless
+        it is given. impratio: the option.
 
         Raises:
             ModelError: the file has nothing that a key could change.
         """
         spec, wanted = self.spec.copy(), dict(changes)
         geoms, table, parts = self._parts(spec)
+        ours = bool(self.replaced) or self.path.parent == Path(__file__).parent
         if "dt" in wanted:
-            wanted.setdefault("timeconst", STIFF * wanted["dt"])
             spec.option.timestep = wanted["dt"]
-        elif self.replaced:
+        if self.replaced or (ours and "dt" in wanted):
             wanted.setdefault("timeconst", STIFF * spec.option.timestep)
         if "impratio" in wanted:
             spec.option.impratio = wanted["impratio"]
         if "gravity" in wanted:
             size = np.linalg.norm(spec.option.gravity)
             down = spec.option.gravity / size if size > 0.0 else np.array([0.0, 0.0, -1.0])
-            spec.option.gravity = wanted["gravity"] * down
-        scale = _resize(spec, self.body, geoms, wanted["size"]) if "size" in wanted else 1.0
+            spec.option.gravity = wanted["gravity"] / self.unit * down
+            spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+        scale = _resize(spec, self.body, geoms, wanted["size"], self.unit) if "size" in wanted else 1.0
         if "incline" in wanted:
             _incline(table, wanted["incline"])
         for part in parts:
@@ -144,52 +155,46 @@ def load(
         why = "it is a directory" if path.is_dir() else "there is no such file"
         raise ModelError(f"model = {str(path)!r}: not a readable MJCF file ({why})")
     try:
-        spec = mujoco.MjSpec.from_file(str(path))
-        raw = spec.compile()
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always", UserWarning)
+            spec = mujoco.MjSpec.from_file(str(path))
+            raw = spec.compile()
     except ValueError as error:
         raise ModelError(f"model = {str(path)!r}: not a readable MJCF file ({' '.join(str(error).split())})") from None
     for part in (*spec.bodies[1:], *spec.geoms):
         part.name = part.name or f"#{part.id}"
     index = body_id(raw, body)
-    name = raw.body(index).name or f"#{index}"
+    name = body_name(raw, index)
     degrees_of_freedom(raw, index)
-    ground = find_support(raw, initial_data(raw), index, support)
-    own, table = spec.body(name), spec.geom(raw.geom(ground).name or f"#{ground}")
-    spec.compiler.fusestatic = bool(own.joints)  # what hangs on it rigidly is part of it
+    own = spec.body(name)
     own.add_site(name=FILE_FRAME)
+    spec.compiler.fusestatic = True  # what hangs on the body rigidly is part of it
+    read = spec.compile()
+    ground = find_support(read, initial_data(read), body_id(read, name), support)
+    table = spec.geom(read.geom(ground).name)
     geoms = list(own.find_all(mujoco.mjtObj.mjOBJ_GEOM))
     replaced: dict[str, str] = {}
     if chosen:
-        _refuse_frictionless(raw, own, geoms, ground)
         replaced = choose(
             spec, mujoco.MjSpec.from_file(str(scene_path("balance-2d"))), [*geoms, table, *_pairs(spec, geoms)]
         )
-    return Scene(spec, path, name, table.name, None, 1.0, tuple(replaced.items())).changed(changes or {})
+    unit, warned = (
+        length_unit(raw.opt.gravity),
+        tuple(dict.fromkeys(" ".join(str(one.message).split()) for one in said)),
+    )
+    scene = Scene(spec, path, name, table.name, None, 1.0, tuple(replaced.items()), unit, warned, read)
+    return scene.changed(changes or {})
 
 
-def _refuse_frictionless(raw: mujoco.MjModel, own: Any, geoms: list[Any], ground: int) -> None:
-    """What the file says of friction holds, before condim is chosen: without friction nothing sticks."""
-    bodies = {geom.parent.id for geom in geoms} | {own.id}
-    read = [condim for body in bodies for condim in _condims(raw, body, ground)]
-    if read and max(read) == 1:
-        read_friction(raw, own.id, ground)
-
-
-def _condims(raw: mujoco.MjModel, body: int, ground: int) -> list[int]:
-    first = int(raw.body_geomadr[body])
-    own = range(first, first + int(raw.body_geomnum[body]))
-    return [contact_friction(raw, geom, ground)[0] for geom in own if can_collide(raw, geom, ground)]
-
-
-def _resize(spec: mujoco.MjSpec, body: str, geoms: list[Any], size: float) -> float:
-    """Give a body of one box its longest side; by how much it has grown."""
+def _resize(spec: mujoco.MjSpec, body: str, geoms: list[Any], size: float, unit: float) -> float:
+    """Give a body of one box its longest side [m], in a file of this unit [m]; by how much it has grown."""
     if len(geoms) != 1:
         raise ModelError(f"size = {size:g}: the body has {len(geoms)} geoms; change them in its file")
     if geoms[0].type != mujoco.mjtGeom.mjGEOM_BOX:
         raise ModelError(f"size = {size:g}: the body is not a box; change it in its file")
     if spec.body(body).explicitinertial and spec.compiler.inertiafromgeom != INERTIA_FROM_GEOM:
         raise ModelError(f"size = {size:g}: the body's <inertial> would not change with it; change both in its file")
-    scale = 0.5 * size / float(np.max(geoms[0].size))
+    scale = 0.5 * size / unit / float(np.max(geoms[0].size))
     geoms[0].size = np.asarray(geoms[0].size) * scale
     return scale
 

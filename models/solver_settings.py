@@ -48,6 +48,10 @@ def choose(spec: mujoco.MjSpec, ours: mujoco.MjSpec, parts: list[Any]) -> dict[s
             replaced[name] = " and ".join(", ".join(f"{x:g}" for x in old) for old in sorted(olds))
         for part in parts:
             setattr(part, name, new)
+    for pair in parts:
+        if isinstance(pair, mujoco.MjsPair) and np.any(pair.solreffriction):
+            replaced["solreffriction"] = ", ".join(f"{x:g}" for x in pair.solreffriction[:2])
+            pair.solreffriction = np.zeros_like(pair.solreffriction)  # as solref
     solrefs = {tuple(np.asarray(part.solref)[:2].tolist()) for part in parts}
     replaced["solref"] = " and ".join(", ".join(f"{x:g}" for x in old) for old in sorted(solrefs))
     spec.option.o_solimp, spec.option.o_margin = ours.default.geom.solimp, 0.0
@@ -63,8 +67,8 @@ def _word(name: str, value: Any) -> str:
 
 
 def _anisotropy(spec: mujoco.MjSpec, parts: list[Any]) -> float:
-    """The greatest squared ratio of both tangents' friction: MuJoCo makes the weaker one as many times as soft."""
+    """How many times softer than the first tangent the softer one is: MuJoCo divides by the friction's square."""
     frictions = [part.friction[:2] for part in parts if isinstance(part, mujoco.MjsPair)]
     if spec.option.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
         frictions.append(spec.option.o_friction[:2])
-    return max((float(np.max(both) / max(np.min(both), 1e-5)) ** 2 for both in frictions), default=1.0)
+    return max((float(both[0] / max(np.min(both), 1e-5)) ** 2 for both in frictions), default=1.0)

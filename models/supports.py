@@ -1,16 +1,15 @@
 """What a body stands on: the flat upper face of a fixed plane, box or upright cylinder, found under the body."""
 
-import copy
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pivoting.models.hull import colliding, ellipsoids
-from pivoting.models.naming import ModelError, geom_id, label
+from pivoting.models.naming import ModelError, body_name, geom_id, label
+from pivoting.models.under import first_met
 
 Array = NDArray[np.float64]
-RAYS = 64  # at most, cast down from the lowest points of the body
 PLANE, BOX, CYLINDER = (int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}")) for kind in ("PLANE", "BOX", "CYLINDER"))
 
 
@@ -56,14 +55,17 @@ def support_surface(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Su
         ModelError: the geom is no plane, box or upright cylinder, or it can move.
     """
     if model.body_weldid[model.geom_bodyid[geom]] != 0:
-        raise ModelError(f"support = {label(model, geom)}: it can move; must be fixed to the world")
+        raise ModelError(f"support = {label(model, geom)}: it can move; must be fixed; name another --support")
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
     R, up = data.geom_xmat[geom].reshape(3, 3), upward(model)
     if kind == PLANE:
         return Surface(geom, np.array(R), np.array(data.geom_xpos[geom]), np.full(2, np.inf), False)
     k = int(np.abs(R.T @ up).argmax())
     if kind not in (BOX, CYLINDER) or (kind == CYLINDER and k != 2):
-        raise ModelError(f"support = {label(model, geom)}: must be a plane, a box or an upright cylinder")
+        word = mujoco.mjtGeom(kind).name.removeprefix("mjGEOM_").lower()
+        told = "the cylinder lies on its side" if kind == CYLINDER else f"of geoms of type {word} no flat face is known"
+        out = "must be a plane, a box or an upright cylinder: give the model a box there, or name another --support"
+        raise ModelError(f"support = {label(model, geom)}: {told}; {out}")
     n, t = R[:, k] * (1.0 if R[:, k] @ up >= 0.0 else -1.0), R[:, (k + 1) % 3]
     thick = size[1] if kind == CYLINDER else size[k]
     half = np.full(2, size[0]) if kind == CYLINDER else size[[(k + 1) % 3, (k + 2) % 3]]
@@ -79,8 +81,7 @@ def support_surface(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Su
 def find_support(model: mujoco.MjModel, data: mujoco.MjData, body: int, named: str | None = None) -> int:
     """Id of the geom that the body stands on: the named one, or else what is under it.
 
-    Rays are cast down from the lowest points of the body; the first geom that they meet, with which the body can
-    collide, is what it comes to stand on. One that is a little inside the body counts.
+    Of those with which it can collide, that on which it would fall first, see `under.first_met`.
 
     Args:
         data: with the kinematics computed.  named: a geom's name, or '#id'.
@@ -90,47 +91,15 @@ def find_support(model: mujoco.MjModel, data: mujoco.MjData, body: int, named: s
     """
     if named is not None:
         return geom_id(model, named)
-    name = model.body(body).name
+    name = body_name(model, body)
     own = colliding(model, body)
     if not own:
         raise ModelError(f"body = {name!r}: it has no colliding geom; must have one with contype, conaffinity or pair")
     others = [geom for geom in range(model.ngeom) if any(can_collide(model, geom, mine) for mine in own)]
-    up = upward(model)
-    _, centre, axes = ellipsoids(model, own)
-    R, origin = data.xmat[body].reshape(3, 3), data.xpos[body]
-    local = R.T @ up
-    reach = np.linalg.norm(local @ axes, axis=1)
-    half = np.einsum("nij,nj->ni", axes, local @ axes) / np.maximum(reach, 1e-300)[:, None]
-    low, top = centre @ local - reach, float((centre @ local + reach).max())
-    lowest = np.argsort(low, kind="stable")
-    near = lowest[low[lowest] <= low[lowest[0]] + 0.02 * (top - low[lowest[0]])]
-    picked = near[np.linspace(0, len(near) - 1, min(RAYS, len(near))).round().astype(int)]
-    points = origin + (centre - half)[picked] @ R.T
-    points = np.vstack([points, points.mean(axis=0)])
-    probe = _only(model, others)
-    best, drop = -1, np.inf
-    for point in points:
-        above = top - float((point - origin) @ up)
-        hit = np.full(1, -1, dtype=np.int32)
-        start = point + above * up
-        group = np.array([1, 0, 0, 0, 0, 0], dtype=np.uint8)
-        far = mujoco.mj_ray(probe, data, start, -up, group, 1, body, hit)
-        if hit[0] >= 0 and far - above < drop - 1e-9 * max(top, 1.0):
-            best, drop = int(hit[0]), far - above
-    if best < 0:
+    met = first_met(model, data, body, own, others, upward(model))
+    if met is None:
         raise ModelError(f"support = None: nothing that body {name!r} can collide with is under it; name a --support")
-    return best
-
-
-def _only(model: mujoco.MjModel, geoms: list[int]) -> mujoco.MjModel:
-    """A copy in which rays meet these geoms alone; planes have no end there, as they have none for contacts."""
-    probe = copy.copy(model)
-    probe.geom_group[:] = 1
-    probe.geom_group[geoms] = 0
-    probe.geom_size[probe.geom_type == PLANE, :2] = 0.0
-    probe.geom_matid[:] = -1  # rays pass through what is drawn transparent
-    probe.geom_rgba[:, 3] = 1.0
-    return probe
+    return met
 
 
 def can_collide(model: mujoco.MjModel, one: int, other: int) -> bool:

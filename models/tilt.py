@@ -13,7 +13,7 @@ from pivoting.models.frames import Array
 from pivoting.models.hull import Hull, Indices, circle
 
 LEAST = 1e-3  # [rad]: a range of less is none
-LARGE = 1000  # ellipsoids: of larger hulls only the neighbours are asked, which by convexity are the first to touch
+LARGE = 1000  # ellipsoids: of larger hulls first only the neighbours are asked, and whether nothing else is lower
 RING = circle(360)[:, :2] / np.cos(np.pi / 360.0)  # around the unit circle, not inside it: no contact is missed
 TURNS = np.deg2rad(5.0) * np.arange(72)  # directions that are tried about a vertex
 SHARES = np.array([0.02, 0.1, 0.25, 0.5, 0.75, 0.9, 0.98])  # and between any two of the faces around it
@@ -88,37 +88,51 @@ class Stance:
 
     def up(self, theta: float) -> Array:
         """(3,) the table's normal at an angle [rad], body frame."""
-        lifted = np.cross(self.axis, [0.0, 0.0, 1.0])
-        return (np.cos(theta) * np.array([0.0, 0.0, 1.0]) - np.sin(theta) * lifted) @ self.rotation
+        up = np.array([0.0, 0.0, 1.0])
+        return (np.cos(theta) * up - np.sin(theta) * cross(self.axis, up)) @ self.rotation
+
+
+def cross(a: Array, b: Array) -> Array:
+    """(3,) the cross product of two vectors, which NumPy is slow at."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def touches(body: Hull, held: Held, up: Array) -> bool:
+    """Whether all that is held is on a table of normal `up` (3,)."""
+    return bool((held.points @ up).max() - held.radius <= body.least(up).min() + body.reach)
 
 
 def tilted(body: Hull, held: Held, up: Array, now: Array | None = None, inward: Array | None = None) -> Stance | None:
     """The stance about what is `held` on a table of normal `up`, or None if it cannot be tilted about that alone.
 
     Args:
+        held: one point, two corners or points of rims, or a ball, which touch there.
         now: (3, 3) body to table frame, to keep the yaw of.
         inward: (3,) what is lifted, of one point; by default towards the CoM, and of a rim towards its centre.
     """
     points, radius, owner = held
-    if (points @ up).max() - radius > body.least(up).min() + body.reach or (radius > 0.0 and len(points) > 1):
+    if radius > 0.0 and len(points) > 1:
         return None
     points = points[np.lexsort(np.round(points, 9).T[::-1])]
     lever = body.com - points[0]
     if len(points) == 2:
         along = points[1] - points[0]
         along = along / np.linalg.norm(along)
-        up = (up - (up @ along) * along) / np.linalg.norm(np.cross(up, along))
-        inward = np.cross(along, up) if np.cross(along, up) @ lever >= -body.reach else np.cross(up, along)
+        up = (up - (up @ along) * along) / np.linalg.norm(cross(up, along))
+        inward = cross(along, up) if cross(along, up) @ lever >= -body.reach else cross(up, along)
     else:
         inward = _inward(body, held, up) if inward is None else inward
-    low, high = (float(end[0]) for end in _interval(body, held, up, inward[None]))
+    near = _near(body, held)
+    low, high = interval(body, held, up, inward, near)
+    if near is not None and high - low > LEAST and not all(_lowest(body, held, up, inward, end) for end in (low, high)):
+        low, high = interval(body, held, up, inward)
     if not LEAST < high - low < np.inf:  # inf: nothing else ever touches, so it lies on nothing
         return None
     t, n = np.cos(low) * inward - np.sin(low) * up, np.sin(low) * inward + np.cos(low) * up
     x, y = (1.0, 0.0) if now is None else (now @ inward)[:2] / np.linalg.norm((now @ inward)[:2])
     yaw = np.array([[x, -y, 0.0], [y, x, 0.0], [0.0, 0.0, 1.0]])
     balance, start = float(np.arctan2(lever @ t, lever @ n)), 0.0 if now is None else max(0.0, -low)
-    turned = yaw @ np.stack([t, np.cross(n, t), n])
+    turned = yaw @ np.stack([t, cross(n, t), n])
     return Stance(points, np.full(len(points), radius), turned, -yaw[:, 1], (0.0, high - low), balance, start, owner)
 
 
@@ -131,21 +145,22 @@ def tilted_aside(body: Hull, held: Held, up: Array, least: float, now: Array | N
     if _rim(body, held).size or len(held.points) > 1:
         return None
     first = _inward(body, held, up)
-    second = np.cross(up, first)
+    second = cross(up, first)
     around = body.ups[body.facets_of(held.owner)] if held.radius == 0.0 else np.zeros((0, 3))
     way = np.stack([around @ first, around @ second], axis=1)
     ways = np.unique(np.round(np.arctan2(way[:, 1], way[:, 0])[np.linalg.norm(way, axis=1) > LEAST], 9))
     between = ways[:, None] + np.diff(ways, append=ways[:1] + 2.0 * np.pi)[:, None] * SHARES
     turns = np.concatenate([TURNS, ways, between.ravel()])
     some = np.cos(turns)[:, None] * first + np.sin(turns)[:, None] * second
-    low, high = _interval(body, held, up, some)
+    low, high = _interval(body, held, up, some, _near(body, held))
     good = (high - low >= least) & (high - low < np.inf) & (low <= LEAST)
     if not good.any():
         return None
     apart = (turns[good][:, None] - turns[~good] + np.pi) % (2.0 * np.pi) - np.pi
     room = np.abs(apart).min(axis=1, initial=np.pi)
     aside = np.abs((turns[good] + np.pi) % (2.0 * np.pi) - np.pi)
-    return tilted(body, held, up, now, some[good][np.lexsort((aside, -np.round(room, 6)))[0]])
+    one = tilted(body, held, up, now, some[good][np.lexsort((aside, -np.round(room, 6)))[0]])
+    return one if one is not None and one.range[1] >= least else None
 
 
 def next_touch(body: Hull, held: Held, up: Array) -> tuple[Array, int]:
@@ -157,10 +172,19 @@ def next_touch(body: Hull, held: Held, up: Array) -> tuple[Array, int]:
     return body.lowest(up, np.array([nearest]))[0], nearest
 
 
-def interval(body: Hull, held: Held, up: Array, inward: Array) -> tuple[float, float]:
-    """Between which angles [rad] from here nothing but `held` is on the table, when `inward` is lifted about it."""
-    low, high = _interval(body, held, up, inward[None])
+def interval(body: Hull, held: Held, up: Array, inward: Array, some: Indices | None = None) -> tuple[float, float]:
+    """Between which angles [rad] from here nothing but `held` is on the table, when `inward` is lifted about it.
+
+    `some`: of which ellipsoids it is asked, by default all.
+    """
+    low, high = _interval(body, held, up, inward[None], some)
     return float(low[0]), float(high[0])
+
+
+def _lowest(body: Hull, held: Held, up: Array, inward: Array, theta: float) -> bool:
+    """Whether nothing is below what is held, at an angle. If so at both ends of an interval, it is so in between."""
+    normal = np.cos(theta) * up + np.sin(theta) * inward
+    return bool(held.points[0] @ normal - held.radius <= body.least(normal).min() + 1e-3 * body.reach)
 
 
 def _inward(body: Hull, held: Held, up: Array) -> Array:
@@ -169,22 +193,24 @@ def _inward(body: Hull, held: Held, up: Array) -> Array:
     inward = [*(body.centre[_rim(body, held)] - held.points[0]), lever][0]
     inward = inward - (inward @ up) * up
     if np.linalg.norm(inward) <= body.reach:  # balanced
-        inward = np.cross(np.eye(3)[np.abs(up).argmin()], up)
+        inward = cross(np.eye(3)[np.abs(up).argmin()], up)
     return inward / np.linalg.norm(inward)
 
 
 def _rim(body: Hull, held: Held) -> Indices:
     """The rims that the point is on."""
     which = np.flatnonzero(body.rank == 2)
+    if not which.size:
+        return which
     on = np.linalg.norm(body.rims(held.points[0]) - held.points[0], axis=1) <= body.reach * (held.radius == 0.0)
     return which[on]
 
 
-def _others(body: Hull, held: Held) -> Indices:
-    """What may touch first: all, or of a large hull's corners the neighbours."""
+def _near(body: Hull, held: Held) -> Indices | None:
+    """What may touch first: of a large hull's corners the neighbours and all that is round; None for all there is."""
     if len(body.centre) <= LARGE or (body.rank[held.owner] > 0).any():
-        return np.arange(len(body.centre))
-    return np.union1d(body.facets[body.facets_of(held.owner)], np.flatnonzero(body.rank > 0))
+        return None
+    return np.union1d(body.facets[body.facets_of(held.owner)], body.wide)
 
 
 def _between(held: Held, points: Array, reach: float) -> NDArray[np.bool_]:
@@ -194,15 +220,15 @@ def _between(held: Held, points: Array, reach: float) -> NDArray[np.bool_]:
     return np.linalg.norm(away - share[..., None] * along, axis=-1) <= reach
 
 
-def _interval(body: Hull, held: Held, up: Array, inward: Array) -> tuple[Array, Array]:
-    """(D,) and (D,): the same for each of `inward` (D, 3).
+def _interval(body: Hull, held: Held, up: Array, inward: Array, some: Indices | None = None) -> tuple[Array, Array]:
+    """(D,) and (D,): the same for each of `inward` (D, 3), of all ellipsoids or `some`.
 
     At theta the table's normal is n = cos(theta) up + sin(theta) inward. A corner, c from the axis, is above it for
     half a turn; an ellipsoid while n.c > |A'n|: a cone of n in the plane of both, about an eigenvector of c c' - A A'.
     """
     if held.radius > 0.0:
         return _rolling(body, held, up, inward)
-    some = _others(body, held)
+    some = np.arange(len(body.centre)) if some is None else some
     corners, wide = some[body.rank[some] == 0], some[body.rank[some] > 0]
     corners = corners[~_between(held, body.centre[corners], body.reach)]
     c = _across(body.centre[corners] - held.points[0], up, inward)

@@ -109,7 +109,7 @@ def _watch_compilers(interrupt: _Interrupt) -> None:
     """One line on stderr when, and only when, something is compiled rather than taken from the cache."""
     from numba.core import event
 
-    class Watch(event.Listener):  # type: ignore[misc]
+    class _Watch(event.Listener):  # type: ignore[misc]
         said = False
 
         def on_start(self, started: event.Event) -> None:
@@ -122,7 +122,7 @@ def _watch_compilers(interrupt: _Interrupt) -> None:
         def on_end(self, ended: event.Event) -> None:
             interrupt.compiling(-1 if ended.kind == "numba:compiler_lock" else 0)
 
-    watch = Watch()
+    watch = _Watch()
     event.register("numba:compiler_lock", watch)
     event.register("numba:run_pass", watch)
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from time import process_time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +16,7 @@ SLIDES = 0.999  # of mu f_n: at more a contact slides
 ROOM = 0.85  # of the friction found that is planned with
 QUICK = 0.2  # of a time step: a law with a greater bandwidth cannot be followed
 SHIPPED = {"impedance": 0.5, "impratio": 1000.0}
-BUDGET = 10.0  # [s] of the processor's time after which nothing further is tried
+TRIES = 10  # of remedies, at most
 
 
 @dataclass(frozen=True)
@@ -80,13 +79,12 @@ class _Case:
     @property
     def least_push(self) -> float:
         """[N] the least normal force of a contact that the answers count on."""
-        return float(np.nanmin(self.run.force[self.world, :, :, -1], initial=np.inf))
+        return self.run.unit * float(np.nanmin(self.run.force[self.world, :, :, -1], initial=np.inf))
 
     @property
     def weight(self) -> float:
         """[N] as believed."""
-        body = self.run.attached.body
-        return body.mass * float(np.linalg.norm(body.gravity))
+        return self.run.load.force
 
     @property
     def mu(self) -> float:
@@ -188,7 +186,7 @@ def _floors(case: _Case) -> Iterator[float]:
     run, i = case.run, case.world
     K = len(run.points)
     off = np.linalg.norm(run.force_measured[i] - run.force[i], axis=-1)
-    error = float(np.quantile(np.nan_to_num(off), 0.95))
+    error = run.unit * float(np.quantile(np.nan_to_num(off), 0.95))
     spare = max(run.mu_world - float(np.max(run.attached.controller.belief.mu)), 0.1 * run.mu_world)
     some = {0.5 * case.weight / K, 2.0 * case.weight / K, 5.0 * case.weight / K}
     rows = run.contact_rows
@@ -197,9 +195,9 @@ def _floors(case: _Case) -> Iterator[float]:
         w = run.angular_velocity[i] @ run.table_axes
         c_n = float(np.nanmax(np.abs(np.cross(w[:, None], np.cross(w[:, None], run.turning[i]))[..., 2]), initial=0.0))
         opening = c_n * max(1.0 - 0.5 * rows.b * rows.h, 0.0) / rows.regularisation * rows.points / K
-        some |= {2.0 * opening}
+        some |= {2.0 * run.unit * opening}
     some |= {1.5 * error * (1.0 + run.mu_world) / spare}
-    least = max(1.2 * float(run.attached.controller.belief.f_min.min()), 0.05 * case.weight / K)
+    least = max(1.2 * run.unit * float(run.attached.controller.belief.f_min.min()), 0.05 * case.weight / K)
     yield from sorted({_up(floor) for floor in some if least < floor < most})
 
 
@@ -239,17 +237,28 @@ def _up(value: float) -> float:
     return float(f"{np.ceil(value / step - 1e-9) * step:.2g}")
 
 
-def tried(run: "Run", simulate: Callable[..., "Run"], budget: float = BUDGET) -> dict[str, Any] | None:
-    """The first remedy that holds the run, by running it: keys, setting and why; None if none was found in time."""
-    start = process_time()
+def tried(run: "Run", simulate: Callable[..., "Run"], most: int = TRIES) -> dict[str, Any]:
+    """Try the remedies of a failing run, in their order, until one holds it.
+
+    Args:
+        simulate: what runs a scenario.
+        most: how many are tried.
+
+    Returns:
+        holds: the keys that hold every world, None if none did.  setting, why: in words, of that.
+        tried: the settings that were tried and did not hold it.  untried: those that are left.
+    """
+    left: list[Remedy] = remedies(run)
+    failed: list[str] = []
     scenario: Scenario = run.scenario
-    for one in remedies(run):
-        if process_time() - start > budget:
-            return None
+    while left and len(failed) < most:
+        one = left.pop(0)
         try:
             again = simulate(scenario.change(**one.keys), run.worlds, run.seed)
         except (ValueError, RuntimeError):  # the key does not fit the scenario: it is no remedy
             continue
         if again.verdict == "pass":
-            return {"keys": dict(one.keys), "setting": one.setting, "why": one.why}
-    return None
+            found = {"holds": dict(one.keys), "setting": one.setting, "why": one.why}
+            return {**found, "tried": failed, "untried": [other.setting for other in left]}
+        failed.append(one.setting)
+    return {"holds": None, "setting": "", "why": "", "tried": failed, "untried": [other.setting for other in left]}

@@ -15,6 +15,7 @@ from pivoting.controller.validate import array, fail
 from pivoting.models.frames import matrix
 from pivoting.models.friction import read_friction
 from pivoting.models.naming import ModelError
+from pivoting.models.on_body import refuse_off_body
 from pivoting.models.reading import RigidBody, read_body
 from pivoting.sim.joint_drag import drag_wrench
 
@@ -81,8 +82,8 @@ class Attached:
             ValueError: `reference` is not finite.
         """
         target = reference if isinstance(reference, Motion) else Motion(reference)
-        state, omega = self.state(data), self.controller.space.lift_motion(target)[1]
-        known = drag_wrench(self.body, self.controller, self._orientation(data), omega)[0]
+        state, turning = self.state(data), self.controller.space.lift_motion(target)[1:]
+        known = drag_wrench(self.body, self.controller, self._orientation(data), *turning)[0]
         return solve(self.controller.problem(state, target, external=known))
 
     def wrench(self, data: mujoco.MjData, reference: ArrayLike | Motion) -> Array:
@@ -118,15 +119,16 @@ def attach(
     Args:
         model: any compiled model.
         body: name of a top-level body that moves freely, or by two slides and a hinge.
-        contacts: the points that stick, in the body frame: [(x, y, z), ...]; one point in the plane, where [(u, v)]
-            along the in-plane axes will do as well [m]. Of what rolls, such as the end of a capsule, the centre.
-        radius: of what rolls, 0 of a point; one number, or one for each contact [m].
+        contacts: the points that stick, on the hull of the body's colliding geoms, in the body frame: [(x, y, z), ...];
+            one point in the plane, where [(u, v)] along the in-plane axes will do as well [m]. Of what rolls, such as
+            the end of a capsule, the centre.
+        radius: of the round end that rolls, 0 of a point; one number, or one for each contact [m].
         law: default `Law.dynamic()`.
         mu: friction to plan with; default what MuJoCo combines from the geoms.
         margin: share of mu kept unused; exactly on the cone's edge nothing sticks.
         f_min: floor of the normal force [N].
         Q_w, Q_f: weights, see `WrenchProblem`; Q_w defaults to the lever of the contact as characteristic length.
-        support: name of the geom that the body stands on; default the model's only plane.
+        support: name of the geom that the body stands on; default what is under it in the first keyframe, or at qpos0.
 
     Raises:
         ModelError: the model cannot be served, with the reason.
@@ -141,6 +143,7 @@ def attach(
     radii = array("radius", np.broadcast_to(radius, len(points)) if np.ndim(radius) == 0 else radius, (len(points),))
     if found.dim == 2 and len(points) != 1:
         raise ModelError(f"contacts = {[p.tolist() for p in points]}: must be one point for a planar body")
+    refuse_off_body(model, found, contacts, radii)
     there = None if any(np.size(contact) == 2 for contact in contacts) else np.array(contacts, dtype=float)
     friction = read_friction(model, found.index, found.support, there) if mu is None else mu
     frame = None if found.dim == 2 else matrix(found.table)

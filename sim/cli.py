@@ -13,7 +13,7 @@ from pivoting.sim.stdout import JsonOutput, console, json_option
 if TYPE_CHECKING:
     from pivoting.sim.scenario import Scenario
 
-# MuJoCo, numba and rerun are imported by the commands that need them: `pivoting --help` answers at once.
+# What one command alone needs, as rerun and matplotlib, is imported by that.
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -98,11 +98,11 @@ class _RunCommand(click.Command):
 )
 @click.option("--limit", "limits", multiple=True, metavar="KEY=VALUE", help="Change a limit of the verdict.")
 @click.option("--model", type=click.Path(path_type=Path), help="An MJCF file of your own, for the scenario pivot.")
-@click.option("--body", help="Name of the body in it that is pivoted.")
+@click.option("--body", help="Name of the body in it that is pivoted, or '#1' of one without a name.")
 @click.option(
     "--contact", help='What it turns about: vertex, edge, lowest, or "x,y,z" or "x,y,z; x,y,z" in its frame, m.'
 )
-@click.option("--support", help="Name of the plane or box geom that it stands on; by default the only plane.")
+@click.option("--support", help="Name (or '#id') of the geom that it stands on; by default what is under it.")
 @click.option("--as-modelled", is_flag=True, help="Keep the file's contact and solver parameters.")
 @click.option("--open-loop", is_flag=True, help="Plan the whole motion once and apply that, whatever happens.")
 @click.option("--out", type=click.Path(), help="Folder for SCENARIO.rrd, SCENARIO.summary.json and summary.json.")
@@ -149,7 +149,7 @@ def run(
     if finished.verdict == "fail" and not open_loop:
         from pivoting.sim.advice import tried
 
-        also["holds"] = tried(finished, simulate)
+        also["advice"] = tried(finished, simulate)
     saved = None
     if folder is not None:  # before it is told: who is told may have gone
         from pivoting.sim.results import save
@@ -159,13 +159,20 @@ def run(
         as_json(jsonable({**finished.summary(), **also}) if saved is None else saved.summary)
     else:
         print_run(console(), finished)
-        if also.get("holds"):
-            click.echo(f"what would hold it: {also['holds']['setting']} ({also['holds']['why']}; tried, it passes)")
-        elif also:
-            click.echo("what would hold it was not found; `remedies` in the summary lists what its figures suggest")
+        if also:
+            click.echo(_advised(also["advice"]))
     for line in () if saved is None else saved.said:
         click.echo(line)  # under --json on stderr, as all else
     return 1 if finished.verdict == "fail" else 0
+
+
+def _advised(advice: dict[str, Any]) -> str:
+    """What would hold a failing run, or what was tried in vain."""
+    if advice["holds"]:
+        return f"what would hold it: {advice['setting']} ({advice['why']}; tried, it passes)"
+    vain = "; ".join(advice["tried"]) or "nothing fits"
+    more = f", and {len(advice['untried'])} more were not tried" if advice["untried"] else ""
+    return f"nothing was found that would hold it: tried {vain}{more}"
 
 
 def main() -> int:

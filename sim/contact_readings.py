@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pivoting.controller.so3 import rotated
 
 Array = NDArray[np.float64]
+NOTHING = 1e-9  # of the forces at work: less is what rounding leaves of them
 FIELDS = 14  # of each listed contact: found, force (3), distance, position (3), normal (3), tangent (3)
 
 
@@ -102,7 +103,9 @@ def list_contacts(sensed: Array, at: Array, declared: Declared) -> Listed:
         sensed: (N, W, S 14).
         at: (N, W, K, 3) where the declared contacts are [world axes, m].
     """
-    contacts = sensed.reshape(*sensed.shape[:2], -1, FIELDS)
+    slots = sensed.reshape(*sensed.shape[:2], -1, FIELDS)
+    used = np.flatnonzero((slots[..., 0] > 0.0).any(axis=(0, 1)))
+    contacts = np.ascontiguousarray(slots[:, :, : 1 + used.max(initial=0)])  # most slots are empty throughout
     there = contacts[..., 0] > 0.0
     share, away = declared.shares(contacts[..., 5:8], at)
     return Listed(
@@ -131,8 +134,9 @@ def read_contacts(listed: Listed, found: Array, touching: Array, declared: Decla
     elsewhere = touching[..., 0] - found  # with other geoms than the support
     rest = np.linalg.norm(touching[..., 1:4] - listed_force, axis=-1)
     size = np.linalg.norm(force, axis=-1)
-    stray = np.where(elsewhere + unlisted > 0.0, rest, 0.0)
-    strays = elsewhere + unlisted
+    pushes = rest > NOTHING * (np.linalg.norm(listed_force, axis=-1) + np.linalg.norm(touching[..., 1:4], axis=-1))
+    stray = np.where((elsewhere + unlisted > 0.0) & pushes, rest, 0.0)
+    strays = np.where(pushes, elsewhere + unlisted, 0.0)  # a contact within a gap makes no force
     if not declared.landing:
         stray = stray + np.where(others, size, 0.0).sum(axis=-1)
         strays = strays + (others & (size > 0.0)).sum(axis=-1)

@@ -18,13 +18,12 @@ body's turn are those of the run; where the contact went along the table is not 
 contact slides, and none holds one that has opened: the drift is then unknown. docs/fidelity.md derives and measures it.
 """
 
-from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from pivoting.models.reading import initial_data
+from numpy.typing import NDArray
+from pivoting.models.contact_rows import ContactRows
 from pivoting.sim.contact_readings import Listed
 
 Array = NDArray[np.float64]
@@ -32,68 +31,6 @@ SLIDES = 1.0 - 1e-9  # of its friction: MuJoCo's cone is exact to rounding
 SPREAD = 1e-4  # determinant of the contacts' shares, below which they are all at one place of an edge
 END = 0.98  # least share of a contact that alone holds an end of an edge
 UNHELD = 10  # steps on end that an end of an edge may be without contact while another contact holds
-
-
-class ContactRows(NamedTuple):
-    """What MuJoCo makes of the contacts between a body and its support, which are all alike.
-
-    Attributes:
-        points: contacts that share the load at the start.
-        pyramidal: whether the friction cone is, else elliptic.
-        mu: (2,) friction along both tangents.
-        D: (3,) R d / (1 - d) of the normal row and of both tangents' [1/kg]; of a pyramid, while all its edges push.
-        b: damping [1/s].  k: stiffness over the impedance [1/s^2].
-        solimp: (5,) how the impedance d follows from the depth.
-        margin: distance from which the contact is active [m].
-        h: time step [s].
-        unknown: why the drift cannot be told from these, or "".
-    """
-
-    points: int
-    pyramidal: bool
-    mu: Array
-    D: Array
-    b: float
-    k: float
-    solimp: Array
-    margin: float
-    h: float
-    unknown: str
-
-    @property
-    def law(self) -> tuple[ArrayLike, ...]:
-        """What has to be the same of all contacts."""
-        return self.pyramidal, self.D, self.b, self.k, self.solimp, self.margin
-
-    @property
-    def regularisation(self) -> float:
-        """R of the normal row of a contact that just touches [1/kg]."""
-        return float(self.D[0] * self.softness(np.array(0.0)))
-
-    def impedance(self, depth: Array) -> Array:
-        """d (...) at depths (...) below the margin [m]."""
-        low, high, width, middle, power = self.solimp
-        if low == high:
-            return np.full(np.shape(depth), low)
-        x = np.clip(np.asarray(depth) / width, 0.0, 1.0)
-        up, down = x**power / middle ** (power - 1.0), (1.0 - x) ** power / (1.0 - middle) ** (power - 1.0)
-        return np.asarray(low + (high - low) * np.where(x <= middle, up, 1.0 - down))
-
-    def softness(self, depth: Array) -> Array:
-        """R / D = (1 - d) / d (...) at depths (...) below the margin [m]."""
-        d = self.impedance(depth)
-        return (1.0 - d) / d
-
-    def depth(self, load: Array) -> Array:
-        """(...) how far below the margin a contact rests [m] under normal loads (...) [N]: k d delta = R f."""
-        least = np.clip(min(self.solimp[:2]), 1e-9, None)
-        push = self.D[0] * np.maximum(load, 0.0) / self.k
-        low, high = np.zeros(np.shape(push)), push * (1.0 - least) / least**2
-        for _ in range(0 if self.solimp[0] == self.solimp[1] else 50):
-            middle = 0.5 * (low + high)
-            soft = self.impedance(middle) * middle < push * self.softness(middle)
-            low, high = np.where(soft, middle, low), np.where(soft, high, middle)
-        return high
 
 
 class Held(NamedTuple):
@@ -108,81 +45,6 @@ class Held(NamedTuple):
     give: Array
     above: Array
     slides: NDArray[np.bool_]
-
-
-def read_rows(model: mujoco.MjModel, body: int, support: int, placements: Iterable[Array]) -> ContactRows | None:
-    """The contact rows between a body and a geom; None where there is no contact.
-
-    Args:
-        placements: of qpos (nq,), where the body is pressed on its support; the first as at the start.
-    """
-    data, found, points = initial_data(model), [], 0
-    for qpos in placements:
-        data.qpos[:] = qpos
-        mujoco.mj_fwdPosition(model, data)
-        ends = [model.geom_bodyid[contact.geom] for contact in data.contact]
-        own = [
-            contact
-            for contact, bodies in zip(data.contact, ends, strict=True)
-            if contact.efc_address >= 0 and support in contact.geom and body in bodies
-        ]
-        points = points or len(own)
-        found += [_row(model, data, contact) for contact in own]
-    if not found:
-        return None
-    first, unknown = found[0], _unknown(model, body)
-    for other in found:
-        if not all(np.allclose(a, b, rtol=1e-6, atol=1e-12) for a, b in zip(first.law, other.law, strict=True)):
-            unknown = unknown or "the contacts of its geoms differ in their parameters"
-    mu = np.min([row.mu for row in found], axis=0)
-    return first._replace(points=points, mu=mu, unknown=unknown or first.unknown)
-
-
-def _row(model: mujoco.MjModel, data: mujoco.MjData, contact: Any) -> ContactRows:
-    """What MuJoCo made of one contact of `data`."""
-    row, dim = int(contact.efc_address), int(contact.dim)
-    pyramidal = int(model.opt.cone) == int(mujoco.mjtCone.mjCONE_PYRAMIDAL)
-    k, b, d = (float(x) for x in data.efc_KBIP[row, :3])
-    mu, D = np.array(contact.friction[:2]), np.array(data.efc_R[row : row + 3]) * d / (1.0 - d)
-    if pyramidal:  # the rows are edges, J_n + mu J_t and J_n - mu J_t, alike
-        D = D[0] * np.array([0.25, 0.5 / mu[0] ** 2, 0.5 / mu[1] ** 2])
-    elif dim > 1:
-        b = float(data.efc_KBIP[row + 1, 1])  # solreffriction
-    low, high, width, middle, power = contact.solimp
-    low, high, middle = np.clip([low, high, middle], 1e-4, 0.9999)  # as MuJoCo does
-    if width <= 1e-15:
-        low = high = 0.5 * (low + high)
-    return ContactRows(
-        points=1,
-        pyramidal=pyramidal,
-        mu=mu,
-        D=D,
-        b=b,
-        k=k,
-        solimp=np.array([low, high, max(width, 1e-15), middle, max(power, 1.0)]),
-        margin=float(contact.includemargin),
-        h=float(model.opt.timestep),
-        unknown="" if dim == 3 else f"its contacts have condim {dim}, not 3",
-    )
-
-
-def _unknown(model: mujoco.MjModel, body: int) -> str:
-    """What of the model leaves the rows, or the step, different from what is assumed here; "" if nothing does."""
-    opt, flags = model.opt, mujoco.mjtEnableBit
-    integrator = mujoco.mjtIntegrator(int(opt.integrator)).name.removeprefix("mjINT_")
-    if integrator not in ("EULER", "IMPLICIT", "IMPLICITFAST"):
-        return f"integrator {integrator.lower()}"
-    if opt.noslip_iterations > 0:
-        return "noslip_iterations change the contact forces that the rows give"
-    if int(opt.solver) == int(mujoco.mjtSolver.mjSOL_PGS):
-        return "solver PGS leaves the rows unbalanced"
-    for flag in ("DIAGEXACT", "SPECULATIVE", "IPC", "SLEEP"):
-        if int(opt.enableflags) & int(getattr(flags, f"mjENBL_{flag}")):
-            return f"the flag {flag.lower()}"
-    first = int(model.body_dofadr[body])
-    if np.any(model.dof_dampingpoly[first : first + int(model.body_dofnum[body])]):
-        return "its joints' damping is not linear"
-    return ""
 
 
 def stepped_point(model: mujoco.MjModel, body: int) -> Array:
@@ -202,7 +64,7 @@ def held(rows: ContactRows, listed: Listed, at: Array, axes: Array) -> Held:
         axes: (3, 3) the table's (t, o, n) as columns, world axes.
     """
     push, pull = listed.local[..., 0], listed.local[..., 1:]
-    on = listed.share.any(axis=-1) & (push > 0.0)
+    pressed = listed.share.any(axis=-1) & (push > 0.0)
     use = np.abs(pull) / rows.mu
     if rows.pyramidal:
         lean = np.maximum(
@@ -215,6 +77,7 @@ def held(rows: ContactRows, listed: Listed, at: Array, axes: Array) -> Held:
     give = (local[..., :1] * listed.tangent + local[..., 1:] * np.cross(listed.normal, listed.tangent)) @ axes[:, :2]
     above = (listed.position - listed.share @ at) @ axes[:, 2]
     values = np.concatenate([give, above[..., None]], axis=-1)
+    on = pressed & ~slides
     weight = np.where(on[..., None], listed.share, 0.0)
     total, shared = (
         np.einsum("...sk,...sv->...kv", weight, values),
@@ -227,7 +90,7 @@ def held(rows: ContactRows, listed: Listed, at: Array, axes: Array) -> Held:
         count = alone.sum(axis=-2)[..., None]
         one = np.einsum("...sk,...sv->...kv", alone.astype(float), values) / np.where(count > 0, count, 1)
         out = np.where(firm[..., None, None], out, np.where(count > 0, one, np.nan))
-    return Held(out[..., :2], np.nan_to_num(out[..., 2]), (on & slides).any(axis=-1))
+    return Held(out[..., :2], np.nan_to_num(out[..., 2]), (pressed & slides).any(axis=-1))
 
 
 @np.errstate(invalid="ignore", over="ignore")
@@ -239,8 +102,13 @@ def drift(
     velocity: Array,
     omega: Array,
     unseen: Array | None = None,
+    settle: int = 0,
 ) -> Array:
     """Predicted slip (W, N+1, K, 2) of K contacts along the table (t, o) [m]; nan from where it is unknown.
+
+    What no row holds in a step moves on as the body's acceleration makes it, which the forces give. That is told of an
+    end of an edge, for a few steps while the other end is held (MuJoCo gives a short edge of a mesh one contact, at one
+    end and the other in turn), and of the start, where a contact that does not carry its load yet may slide.
 
     Args:
         of: (W, N) first.
@@ -248,9 +116,7 @@ def drift(
         touching: (W, N+1, K, 3) likewise to where they touch.
         velocity, omega: (W, N+1, 3) of that point and of the turn, table axes [m/s, rad/s].
         unseen: (W, N, K, 2) acceleration of what touches that the rows do not see [m/s^2].
-
-    An end of an edge that no row holds for a few steps, while the other is held, moves on as the body's acceleration
-    makes it: MuJoCo gives a short edge of a mesh one contact, at one end and the other in turn.
+        settle: steps that the start may take.
     """
     h, bh = rows.h, rows.b * rows.h
     after = omega[:, 1:, None]
@@ -274,19 +140,19 @@ def drift(
         path[:, step + 1] = kept[:, step] * speed + added[:, step]
         speed = path[:, step + 1] + turns[:, step]
     path[:, 1:] = np.cumsum(h * path[:, 1:] + beyond, axis=1)
-    path[:, 1:][np.logical_or.accumulate(_failure(of) > 0, axis=1)] = np.nan
+    path[:, 1:][np.logical_or.accumulate(_failure(of, settle) > 0, axis=1)] = np.nan
     return path if not rows.unknown else np.full_like(path, np.nan)
 
 
-def why_unknown(rows: ContactRows | None, of: Held, time: Array) -> list[str]:
+def why_unknown(rows: ContactRows | None, of: Held, time: Array, settle: int = 0) -> list[str]:
     """Of each world why its drift cannot be told, or "".
 
     Args:
-        of: (W, N) first.  time: (N+1,) [s].
+        of: (W, N) first.  time: (N+1,) [s].  settle: as for `drift`.
     """
     if rows is None:
         return ["it does not touch its support at the start"] * len(of.slides)
-    failure = _failure(of)
+    failure = _failure(of, settle)
     first = (failure > 0).argmax(axis=1)
     events = [(_FAILURES[int(row[step])], float(time[step])) for row, step in zip(failure, first, strict=True)]
     return [rows.unknown or (f"{what} at {when:.3g} s" if what else "") for what, when in events]
@@ -295,10 +161,11 @@ def why_unknown(rows: ContactRows | None, of: Held, time: Array) -> list[str]:
 _FAILURES = ("", "a contact slides", "no contact holds it", "an end of the edge is without contact")
 
 
-def _failure(of: Held) -> NDArray[np.int8]:
-    """(W, N) what of `_FAILURES` keeps the rows from telling the drift."""
+def _failure(of: Held, settle: int) -> NDArray[np.int8]:
+    """(W, N) what of `_FAILURES` keeps the rows from telling the drift, after the first steps."""
     free = np.isnan(of.give[..., 0])
     count = np.cumsum(free, axis=1)
     streak = count - np.maximum.accumulate(np.where(free, 0, count), axis=1)
     failed = np.select([of.slides, free.all(axis=-1), (streak > UNHELD).any(axis=-1)], [1, 2, 3], 0)
+    failed[:, :settle] = 0
     return np.asarray(failed, dtype=np.int8)

@@ -13,11 +13,12 @@ from pivoting.controller.rotations import Turn
 from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product, space
 from pivoting.controller.validate import fail
+from pivoting.models.contact_rows import read_rows
 from pivoting.models.contact_settings import contact_settings
 from pivoting.models.frames import matrix
 from pivoting.models.friction import read_friction
 from pivoting.models.given import NEAR
-from pivoting.models.naming import ModelError
+from pivoting.models.naming import ModelError, body_id, geom_id
 from pivoting.models.reading import initial_data, place, read_body, turn
 from pivoting.models.scenes import Scene, load
 from pivoting.models.sensors import instrument
@@ -26,7 +27,6 @@ from pivoting.sim.attach import Attached, attach
 from pivoting.sim.contact_readings import Declared
 from pivoting.sim.control import Answers, BoundedControl, Control, LawControl, States
 from pivoting.sim.engine_log import engine_log
-from pivoting.sim.fidelity import read_rows
 from pivoting.sim.joint_drag import drag_wrench
 from pivoting.sim.keys import CONTROL_KEYS
 from pivoting.sim.plan import Plan, planned, transplanted
@@ -110,8 +110,8 @@ def simulate(
 
     batch = Batch(model, int(worlds), nthread=1 if worlds == 1 else 0, persistent=True)
     errors = np.deg2rad(case.spread) * np.random.default_rng(seed).uniform(-1.0, 1.0, int(worlds))
-    bounds = case.bounds()
-    drag = drag_wrench(attached.body, attached.controller, *told[:2])
+    bounds = case.bounds(scene.unit)
+    drag = drag_wrench(attached.body, attached.controller, *told)
     depth = 0.0
     if case.chosen and rows is not None:
         first = _load(attached.controller, LawControl(attached.controller, told, bounds, drag), told)
@@ -148,6 +148,7 @@ def simulate(
         seed=int(seed),
         attached=attached,
         load=believed.load,
+        unit=scene.unit,
         replaced=world.replaced,
         settings=settings,
         model=model,
@@ -180,7 +181,7 @@ def simulate(
         plan=None if played is None else played.plan,
         plans=None if horizons is None else horizons.log,
         events=() if horizons is None else tuple(horizons.events),
-        engine_warnings=tuple(warned),
+        engine_warnings=(*world.warned, *warned),
         controller="scenario" if controller is None else "given",
     )
 
@@ -245,7 +246,7 @@ def _start(
             mujoco.mj_forward(model, data)
             if floats or not (floats := contact_margin(model, data, body)):
                 break
-        refuse_strays(model, data, body)
+        refuse_strays(model, data, body, plan.unit)
         mujoco.mj_getState(model, data, state, kind)
         row[:] = state
 
@@ -258,7 +259,9 @@ def believe(
     believed = read.changed(case.believed)
     nominal = believed.compile()
     case = replace(case, body=believed.body, support=believed.support)
-    plan = planned(case, nominal)
+    plan = planned(case, nominal, read.unit)
+    if case.chosen and case.mu is None:  # what the file itself says of friction holds: it may have none
+        read_friction(read.read, body_id(read.read, read.body), geom_id(read.read, read.support), plan.contacts)
     if controller is not None:
         _check(controller, case, plan)
     if plan.load.force == 0.0 and (case.f_min if controller is None else controller.belief.f_min.max()) == 0.0:
@@ -273,8 +276,8 @@ def believe(
         law=case.control_law(),
         mu=case.mu,
         margin=case.margin,
-        f_min=float(case.absolute(plan.load).f_min),
-        Q_w=case.wrench_weight(plan.body.dim),
+        f_min=float(case.absolute(plan.load).f_min) / read.unit,
+        Q_w=case.wrench_weight(plan.body.dim, read.unit),
         support=case.support,
     )
     return attached, plan

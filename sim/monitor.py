@@ -19,7 +19,9 @@ BOUNDED = STATUS.index("bounded")
 
 @dataclass(frozen=True, eq=False)
 class Measures:
-    """One value for each world, (W,); slip over the whole run, everything else after the scenario's `settle_s`.
+    """One value for each world, (W,); angles, lost contact, friction and forces after `settle_s`, all else over all.
+
+    In the unit that the name ends with, whatever the model's unit of length is.
 
     Attributes:
         slip_max_m: greatest displacement of a contact along the table from where it started, less what it rolled.
@@ -68,15 +70,15 @@ def measure(run: "Run") -> Measures:
     mismatch = _rms(np.linalg.norm(measured - predicted, axis=-1)) / _rms(np.linalg.norm(predicted, axis=-1))
     ever = pushed.any(axis=(1, 2))
     return Measures(
-        slip_max_m=np.linalg.norm(run.slip, axis=-1).max(axis=(1, 2)),
-        slip_floor_m=np.linalg.norm(predicted_slip(run), axis=-1).max(axis=(1, 2)),
+        slip_max_m=run.unit * np.linalg.norm(run.slip, axis=-1).max(axis=(1, 2)),
+        slip_floor_m=run.unit * np.linalg.norm(predicted_slip(run), axis=-1).max(axis=(1, 2)),
         angle_error_rms_deg=_rms(error),
         angle_error_max_deg=np.abs(error).max(axis=1),
         contact_lost_s=np.count_nonzero(lost, axis=1) * run.dt,
         undeclared_contact_s=np.count_nonzero(run.contacts.strays > 0.0, axis=1) * run.dt,
         penetration_rel=_penetration(run) / run.size,
         contacts_missing=np.maximum(run.scenario.limits.contacts_end - run.contacts_found[:, -1], 0.0),
-        bounce_m=_bounce(run),
+        bounce_m=run.unit * _bounce(run),
         friction_use_max=np.where(ever, np.where(pushed, use, 0.0).max(axis=(1, 2)), np.nan),
         force_mismatch_rel=mismatch,
         residual_max=np.where(np.isfinite(run.residual), run.residual, np.inf).max(axis=1),
@@ -109,14 +111,19 @@ def predicted_slip(run: "Run") -> Array:
         return np.full(run.slip.shape, np.nan)
     point, omega = run.stepped[..., None, :], run.angular_velocity @ run.table_axes
     turning, touching = run.turning - point, run.lever - point
-    return drift(run.contact_rows, run.held, turning, touching, run.stepped_velocity, omega, unseen(run))
+    return drift(run.contact_rows, run.held, turning, touching, run.stepped_velocity, omega, unseen(run), _settle(run))
 
 
 def slip_floor_unknown(run: "Run") -> str:
     """Why that cannot be predicted, in the first world where it cannot; "" where it can in all."""
-    found = why_unknown(run.contact_rows, run.held, run.time)
+    found = why_unknown(run.contact_rows, run.held, run.time, _settle(run))
     told = [f"{why}{f' in world {world}' * (run.worlds > 1)}" for world, why in enumerate(found) if why]
     return told[0] if told else ""
+
+
+def _settle(run: "Run") -> int:
+    """Steps that the start may take."""
+    return int(np.count_nonzero(run.time[:-1] < run.scenario.limits.settle_s - 1e-12))
 
 
 def _rms(values: Array) -> Array:

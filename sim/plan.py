@@ -10,9 +10,10 @@ from pivoting.controller.space import quaternion_product
 from pivoting.models.candidates import planar_stance, stance
 from pivoting.models.frames import matrix, quaternion
 from pivoting.models.given import NEAR
-from pivoting.models.grip import holds
+from pivoting.models.grip import grip
 from pivoting.models.naming import ModelError, label
 from pivoting.models.reading import RigidBody, file_frame, initial_data, read_body
+from pivoting.models.supports import body_size
 from pivoting.models.tilt import Arc
 from pivoting.sim.keys import LOWEST
 from pivoting.sim.relative import Load, load
@@ -36,6 +37,7 @@ class Plan:
         start: (4,) orientation at angle 0, object axes to world.
         range: the angles [rad] at which nothing else touches the support.
         face: (P, 3) the corners that touch as well at angle 0, body frame [m].
+        unit: of the model's lengths [m]; all the above is in it.
     """
 
     body: RigidBody
@@ -46,27 +48,36 @@ class Plan:
     start: Array
     range: tuple[float, float]
     face: Array
+    unit: float = 1.0
 
     @property
     def load(self) -> Load:
-        """What values of the scenario may be relative to."""
+        """What values of the scenario may be relative to, in N, m and s."""
         points = np.array([self.body.point(contact) for contact in self.contacts])
-        return load(self.body.mass, self.body.gravity, points, self.radius)
+        return load(self.body.mass, self.unit * self.body.gravity, self.unit * points, self.unit * self.radius)
 
 
-def planned(case: Scenario, model: mujoco.MjModel) -> Plan:
-    """The scenario's plan on its compiled model, as the controller believes it.
+def planned(case: Scenario, model: mujoco.MjModel, unit: float = 1.0) -> Plan:
+    """The scenario's plan on its compiled model, whose lengths are in `unit` [m], as the controller believes it.
 
     Raises:
         ModelError: the model cannot be served, or the object cannot be pivoted on that contact; with the reason.
     """
     body = read_body(model, case.body, case.support)
+    size = body_size(model, body.index)
+    _refuse_beside(model, body, initial_data(model).xipos[body.index], size, "its centre of mass", unit)
     found = _planar(case, model, body) if body.dim == 2 else _spatial(case, model, body)
-    over = float(body.surface.beyond(found.at).max())
-    if over > NEAR * float(np.linalg.norm(found.contacts[0] - body.com)):
-        told = f"the contact would be {over:.3g} m beside its upper face"
+    held = (found.contacts - found.contacts[0]) @ (matrix(found.start) @ matrix(body.axes).T).T
+    _refuse_beside(model, body, found.at + held, NEAR * size, "the contact", unit)
+    return replace(found, unit=unit)
+
+
+def _refuse_beside(model: mujoco.MjModel, body: RigidBody, at: Array, allowed: float, what: str, unit: float) -> None:
+    """A point (3,) of the body has to be above the face that it stands on."""
+    over = float(body.surface.beyond(at).max())
+    if over > allowed:
+        told = f"{what} would be {over * unit:.3g} m beside its upper face"
         raise ModelError(f"support = {label(model, body.support)}: {told}; must be under the body")
-    return found
 
 
 def transplanted(plan: Plan, model: mujoco.MjModel, body: RigidBody, grown: float) -> Plan:
@@ -97,14 +108,15 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
     now = data.xmat[body.index].reshape(3, 3)
     origin, axes = file_frame(model, body.index)
     contact = case.contact if isinstance(case.contact, str) else _in_body_frame(case.contact, (origin, axes))
+    arc = None if case.about == "yaw" else _arc(case)
     found = stance(
         model,
         body.index,
         contact,
         quaternion(now),
         body.table,
-        arc=None if case.about == "yaw" else _arc(case),
-        holds=holds(model, body),
+        arc=arc,
+        gripped=None if case.about == "yaw" else grip(model, body, arc),
         shown=lambda points: (points - origin) @ axes,
     )
     start, axis = table @ found.rotation, table @ found.axis
@@ -114,9 +126,7 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
     if case.about == "yaw":
         start, axis = matrix(quaternion_product(exponential(found.balance * axis), quaternion(start))), table[:, 2]
         limits = (-2.0 * np.pi, 2.0 * np.pi)
-    # the object starts where its file has it: the first contact is put under the place that it has there
-    there = data.xpos[body.index] + now @ found.points[0] - body.origin
-    at = body.origin + there - (there @ table[:, 2]) * table[:, 2]
+    at = _below(model, body, found.points[0])  # the object starts where its file has it
     return Plan(body, found.points, found.radius, at, axis, quaternion(start), limits, found.face)
 
 
@@ -152,4 +162,12 @@ def _planar(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
     point, radius, most = planar_stance(model, body.index, case.contact, axes, arc=_arc(case))
     face = point - radius * axes[:, 2]
     limits = (gap, most - gap)
-    return Plan(body, point[None], np.array([radius]), body.origin, -table[:, 1], body.table, limits, face[None])
+    at = _below(model, body, point)
+    return Plan(body, point[None], np.array([radius]), at, -table[:, 1], body.table, limits, face[None])
+
+
+def _below(model: mujoco.MjModel, body: RigidBody, point: Array) -> Array:
+    """(3,) where on the table, world axes, it is under the place that the file gives a point (3,) of the body frame."""
+    data, up = initial_data(model), body.surface.axes[:, 2]
+    there = data.xpos[body.index] + data.xmat[body.index].reshape(3, 3) @ point - body.origin
+    return body.origin + there - (there @ up) * up

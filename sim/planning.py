@@ -63,7 +63,7 @@ def scenario_horizon(case: Scenario, attached: Attached, plan: Plan, steps: int 
         float(case.plan_step),
         integrator=case.integrator,
         Q=case.track * np.diag((controller.units.force / controller.units.pose) ** 2),
-        bounds=case.bounds(),
+        bounds=case.bounds(plan.unit),
         stick=True,
         clear=_watched(attached, plan),
     )

@@ -260,7 +260,7 @@ def _series(film: Film) -> dict[str, tuple[Colour, float, Array]]:
     What is along the table is in the plane a component with its sign, in space a magnitude.
     """
     run, i, n, N, plane = film.run, film.world, film.states, film.answers, film.dim == 2
-    slips = 1e3 * run.slip[i, :n], 1e3 * predicted_slip(run)[i, :n]
+    slips = 1e3 * run.unit * run.slip[i, :n], 1e3 * run.unit * predicted_slip(run)[i, :n]
     forces = run.force_measured[i, :N], film.force[:N]
 
     def along(vectors: Array) -> Array:

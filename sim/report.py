@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from pivoting.controller.example import EXAMPLES, Digit
 from pivoting.controller.solution import Solution
+from pivoting.models.lengths import NAMES
 from pivoting.sim.keys import GROUPS, KEYS
 from pivoting.sim.run import Run
 from pivoting.sim.scenario import Scenario
@@ -17,6 +18,7 @@ from rich.table import Table
 
 _EVENTS, _FAILED = 5, 10  # events and failed worlds that people are shown
 _READ = {"object": "read of the object", "contact_settings": "contact"}  # what was read, in the summary and in words
+_SAID = {"replaced": "in place of the file's", "contacts": "", "coupling": ""}  # of it otherwise, or not at all
 _UNITS = {"kg_m2": "kg m^2", "kg": "kg", "m": "m", "s": "s"}  # with which a name in the summary may end
 
 # name in the summary: (what people read, factor, unit)
@@ -26,7 +28,7 @@ _LINES = {
     "angle_error_max_deg": ("angle error, greatest", 1.0, "deg"),
     "contact_lost_s": ("time without contact", 1.0, "s"),
     "undeclared_contact_s": ("time with an undeclared contact", 1.0, "s"),
-    "penetration_rel": ("depth that the contact does not explain", 100.0, "% of the lever"),
+    "penetration_rel": ("depth not explained, of the lever", 100.0, "%"),
     "friction_use_max": ("friction used, |f_t| / (mu f_n)", 1.0, ""),
     "force_mismatch_rel": ("contact force, predicted against measured", 100.0, "%"),
     "contacts_missing": ("contacts missing at the end", 1.0, ""),
@@ -44,7 +46,8 @@ def print_run(console: Console, run: Run) -> None:
         for key, value in summary["resolved"].items()
     ]
     read = [f"{name}: {_words(summary[key])}" for key, name in _READ.items() if summary.get(key)]
-    for line in [", ".join(resolved)] * bool(resolved) + read:
+    lengths = f"lengths are taken to be in {NAMES[run.unit]}, from the size of gravity; what follows is in m and N"
+    for line in [lengths] * (run.unit != 1.0) + [", ".join(resolved)] * bool(resolved) + read:
         console.print(line, highlight=False, markup=False, soft_wrap=True, style="dim")
     table = Table()
     for heading in ("measured in MuJoCo" + (", worst world" if run.worlds > 1 else ""), "value", "limit", ""):
@@ -122,17 +125,19 @@ def key_help() -> list[tuple[str, list[tuple[str, str]]]]:
     return [*out, ("Keys of --limit, what the verdict allows, with the unit in the name", limits)]
 
 
-def _words(read: Mapping[str, Any]) -> str:
+def _words(read: Mapping[str, Any], between: str = ", ") -> str:
     """A mapping of the summary as people read it: names, numbers, units; what is empty or zero is left out."""
     said = []
     for key, value in read.items():
         unit = next((unit for unit in _UNITS if key.endswith(f"_{unit}")), "")
-        name = key.removesuffix(f"_{unit}").replace("_", " ")
+        name = _SAID.get(key, key.removesuffix(f"_{unit}").replace("_", " "))
+        if not name:
+            continue
         if isinstance(value, Mapping):
-            said.append(f"{name} ({_words(value)})" if value else "")
+            said.append(f"{name} ({_words(value, '; ')})" if value else "")
         elif isinstance(value, str) or np.any(value):
             said.append(f"{name} {_shown(value)} {_UNITS.get(unit, '')}".strip())
-    return ", ".join(filter(None, said))
+    return between.join(filter(None, said))
 
 
 def _shown(value: Any) -> str:

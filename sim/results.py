@@ -4,8 +4,11 @@ import json
 import os
 import re
 import shlex
-from collections.abc import Mapping
+import signal
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from threading import current_thread, main_thread
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,7 +40,7 @@ def stem(case: Scenario) -> str:
 
 
 def save(run: Run, folder: Path, world: int | None = None, *, also: Mapping[str, Any] | None = None) -> Saved:
-    """Write NAME.rrd and NAME.summary.json, which is also the folder's summary.json, each whole or not at all.
+    """Write NAME.rrd and NAME.summary.json, which is also the folder's summary.json: all of them, whole, or none.
 
     Args:
         run: of `simulate`.
@@ -54,27 +57,55 @@ def save(run: Run, folder: Path, world: int | None = None, *, also: Mapping[str,
     recording: Path | None = folder / f"{name}.rrd"
     assert recording is not None
     replaced = recording.exists() or (folder / f"{name}.summary.json").exists()
+    parts: dict[Path, Path] = {}
     try:
-        record(run, recording, world=chosen)
-        which = (
-            f"world {chosen} of {run.worlds}" + (", the worst," if world is None else "") if run.worlds > 1 else "it"
-        )
-        told = f"{which} is in {recording}, see it with: rerun {shlex.quote(str(recording))}"
-    except RecordingOffError as off:
-        recording, told = None, f"nothing is recorded: {off}"
-    summary = {
-        **jsonable(run.summary()),
-        **jsonable(dict(also or {})),
-        "recording": None if recording is None else recording.name,
-        "recorded_world": None if recording is None else chosen,
-    }
-    text = json.dumps(summary, allow_nan=False, indent=1) + "\n"
-    for target in (folder / f"{name}.summary.json", folder / LATEST):
-        partial = target.with_name(f".{target.name}.{os.getpid()}.part")
         try:
-            partial.write_text(text)
-            partial.replace(target)
-        finally:
-            partial.unlink(missing_ok=True)
+            parts[recording] = _part(recording)
+            record(run, parts[recording], world=chosen)
+            which = (
+                f"world {chosen} of {run.worlds}" + (", the worst," if world is None else "")
+                if run.worlds > 1
+                else "it"
+            )
+            told = f"{which} is in {recording}, see it with: rerun {shlex.quote(str(recording))}"
+        except RecordingOffError as off:
+            parts.clear()
+            recording, told = None, f"nothing is recorded: {off}"
+        summary = {
+            **jsonable(run.summary()),
+            **jsonable(dict(also or {})),
+            "recording": None if recording is None else recording.name,
+            "recorded_world": None if recording is None else chosen,
+        }
+        text = json.dumps(summary, allow_nan=False, indent=1) + "\n"
+        for target in (folder / f"{name}.summary.json", folder / LATEST):
+            parts[target] = _part(target)
+            parts[target].write_text(text)
+        with _uninterrupted():
+            for target, part in parts.items():
+                part.replace(target)
+    finally:
+        for part in parts.values():
+            part.unlink(missing_ok=True)
     wrote = "replaced" if replaced else "wrote"
     return Saved(summary, [f"{wrote} {folder / f'{name}.summary.json'}, also as {LATEST}", told])
+
+
+def _part(target: Path) -> Path:
+    return target.with_name(f".{target.name}.{os.getpid()}.part")
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """A SIGINT that comes meanwhile is sent again when this is over."""
+    if current_thread() is not main_thread():  # an interrupt is raised in that one alone
+        yield
+        return
+    came: list[int] = []
+    handler = signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        for number in came[:1]:
+            signal.raise_signal(number)

@@ -11,15 +11,16 @@ from pivoting.controller.plan import Plan
 from pivoting.controller.so3 import rotated
 from pivoting.controller.space import CONJUGATE, Space, quaternion_product, space
 from pivoting.controller.units import lever
+from pivoting.models.contact_rows import ContactRows
 from pivoting.models.contact_settings import ContactSettings
 from pivoting.models.frames import matrix
-from pivoting.models.naming import label
-from pivoting.models.reading import RigidBody
+from pivoting.models.naming import geom_name
+from pivoting.models.reading import RigidBody, file_frame
 from pivoting.sim.advice import reasons, remedies
 from pivoting.sim.attach import Attached
 from pivoting.sim.contact_readings import ContactReadings, Declared
 from pivoting.sim.control import BOUNDED, Event, PlanLog, plan_figures
-from pivoting.sim.fidelity import ContactRows, Held, stepped_point
+from pivoting.sim.fidelity import Held, stepped_point
 from pivoting.sim.monitor import Measures, measure, slip_floor_unknown
 from pivoting.sim.relative import Load
 from pivoting.sim.scenario import Scenario
@@ -53,6 +54,7 @@ class Run:
         seed: of the worlds' initial errors.
         attached: the controller and what it believes.
         load: what the scenario's relative values are relative to.
+        unit: of the model's lengths [m], and with it of all lengths, forces and moments below.
         model: the world's, with the sensors of the loop.  truth: the body as that has it.
         replaced: what of the file gave way to the settings of the shipped scenes: name, and what it was.
         settings: contact parameters that were chosen for the object, if they were.
@@ -89,6 +91,7 @@ class Run:
     seed: int
     attached: Attached
     load: Load
+    unit: float
     model: mujoco.MjModel
     truth: RigidBody
     replaced: tuple[tuple[str, str], ...]
@@ -267,7 +270,9 @@ class Run:
     @property
     def limits(self) -> Limits:
         """Of the verdict, with that on the slip in metres."""
-        return self.scenario.limits.for_object(self.size, float(np.linalg.norm(self.truth.gravity)))
+        return self.scenario.limits.for_object(
+            self.unit * self.size, self.unit * float(np.linalg.norm(self.truth.gravity))
+        )
 
     @cached_property
     def strays(self) -> list[str]:
@@ -301,8 +306,9 @@ class Run:
             "scenario": self.scenario.name,
             "model": str(self.scenario.path),
             "body": self.scenario.body,
-            "contacts": self.points.tolist(),
-            "radius": self.radius.tolist(),
+            "length_unit_m": self.unit,
+            "contacts": (self.unit * self.points).tolist(),
+            "radius": (self.unit * self.radius).tolist(),
             "changes": self.scenario.changes,
             "resolved": self.scenario.resolved(self.load),
             "limits": asdict(self.limits),
@@ -323,7 +329,7 @@ class Run:
             "reasons": reasons(self),
             "remedies": [remedy.setting for remedy in remedies(self)],
             "undeclared_contacts": self.strays,
-            "support": label(self.model, self.truth.support).strip("'"),
+            "support": geom_name(self.model, self.truth.support),
             "object": self.object,
             "contact_settings": self.contact_settings,
             "events": [event._asdict() for event in self.events],
@@ -334,16 +340,21 @@ class Run:
 
     @property
     def object(self) -> dict[str, Any]:
-        """What was read of the object, as the world has it; the contacts in its body frame."""
-        R = matrix(self.truth.axes)
+        """What was read of the object, as the world has it, in the frame that its file gives the body.
+
+        `contact` is what --contact takes, in the file's own unit of length.
+        """
+        origin, axes = file_frame(self.model, self.truth.index)
+        contacts = (self.truth.com + self.points @ matrix(self.truth.axes).T - origin) @ axes
         return {
-            "support": label(self.model, self.truth.support).strip("'"),
+            "support": geom_name(self.model, self.truth.support),
             "mass_kg": self.truth.mass,
-            "inertia_kg_m2": np.asarray(self.truth.inertia).tolist(),
-            "com_m": self.truth.com.tolist(),
+            "inertia_kg_m2": (self.unit**2 * np.asarray(self.truth.inertia)).tolist(),
+            "com_m": (self.unit * (self.truth.com - origin) @ axes).tolist(),
             "mu": self.mu_world,
-            "contacts_m": (self.truth.com + self.points @ R.T).tolist(),
-            "radius_m": self.radius.tolist(),
+            "contacts_m": (self.unit * contacts).tolist(),
+            "contact": "; ".join(",".join(f"{x:.9g}" for x in point) for point in contacts),
+            "radius_m": (self.unit * self.radius).tolist(),
             "damping": 0.0 if self.truth.drag is None else float(self.truth.drag.damping.max()),
             "frictionloss": 0.0 if self.truth.drag is None else float(self.truth.drag.friction.max()),
         }

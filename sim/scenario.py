@@ -15,6 +15,7 @@ from pivoting.controller.laws import Law
 from pivoting.controller.problem import wrench_weight
 from pivoting.controller.references import Constant, MinimumJerk, Reference, Sine
 from pivoting.controller.validate import Array, fail, number, one_of
+from pivoting.models.lengths import POWERS
 from pivoting.models.scenes import BODY, TABLE, WORLD_KEYS, scene_path
 from pivoting.sim.keys import BOUND_KEYS, HIDDEN_KEYS, KEYS, LOWEST, RELATIVE_KEYS, check, parsed
 from pivoting.sim.relative import Load, absolute
@@ -32,7 +33,7 @@ class Scenario:
     Attributes:
         name, summary: shown by `pivoting list`.
         scene: name of an MJCF file in models/, or the path of one of your own.
-        body, support: names of the object and of the geom that it stands on (None: the only plane).
+        body, support: names of the object and of the geom that it stands on (None: what is under it).
         contact: what stays put: "corner" (planar scenes), "vertex", "edge", "lowest", or points (K, 3), body frame,
             see `models.candidates.stance`.
         chosen: whether the object's own contact and solver parameters give way to those of the shipped scenes.
@@ -210,18 +211,26 @@ class Scenario:
             for key, value in given.items()
         }
 
-    def bounds(self) -> WrenchBounds:
-        """On the wrench, of a scenario that is `absolute`; without any, one that bounds nothing."""
-        given = {key: self._number(key) for key in BOUND_KEYS if getattr(self, key) is not None}
+    def bounds(self, unit: float = 1.0) -> WrenchBounds:
+        """On the wrench, of a scenario that is `absolute`; without any, one that bounds nothing.
+
+        Args:
+            unit: of the model's lengths [m], in which the bounds are then.
+        """
+        given = {
+            key: self._number(key) / unit ** POWERS[KEYS[key].unit]
+            for key in BOUND_KEYS
+            if getattr(self, key) is not None
+        }
         return WrenchBounds(**{key.removesuffix("_max"): value for key, value in given.items()})
 
     def _number(self, key: str) -> float:
         """A value that is no longer relative."""
         return number(key, getattr(self, key), unit=KEYS[key].unit)
 
-    def wrench_weight(self, dim: int) -> Array | None:
-        """Q_w of the characteristic length, or None for the controller's own."""
-        return None if self.length is None else wrench_weight(dim, self.length)
+    def wrench_weight(self, dim: int, unit: float = 1.0) -> Array | None:
+        """Q_w of the characteristic length, in a model's `unit` of length [m], or None for the controller's own."""
+        return None if self.length is None else wrench_weight(dim, self.length / unit)
 
     def change(self, **overrides: Any) -> "Scenario":
         """This scenario with other values; `world.KEY` (or a mapping `world`) changes the world alone.

@@ -22,9 +22,9 @@ def own_object(
 
     Args:
         model: MJCF file.
-        body: name of a body that moves freely, or by two slides and a hinge.
+        body: name of a body that moves freely, or by two slides and a hinge; '#1' of one without a name.
         contact: "vertex", "edge", "lowest", or points (K, 3) in the body frame [m]; see `models.candidates.stance`.
-        support: name of the plane or box geom that it stands on; None: the only plane.
+        support: name of the geom that it stands on, a plane, a box or an upright cylinder; None: what is under it.
         chosen: simulate it with the contact and solver parameters of the shipped scenes (`models/settings.xml`).
     """
     return Scenario(

@@ -36,11 +36,11 @@ def console() -> "Console":
     """For people. When its reader has gone that is for the process to say, not for rich, which would exit with 1."""
     from rich.console import Console
 
-    class Page(Console):
+    class _Page(Console):
         def on_broken_pipe(self) -> NoReturn:
             raise
 
-    return Page()
+    return _Page()
 
 
 def json_option(help: str) -> Callable[[Command], Command]:

@@ -9,9 +9,10 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 from pivoting.controller.controller import WrenchController, world_wrench
+from pivoting.models.contact_rows import ContactRows
 from pivoting.sim.contact_readings import FIELDS, ContactReadings, Declared, list_contacts, read_contacts
 from pivoting.sim.control import Answers, Control, States
-from pivoting.sim.fidelity import ContactRows, Held, held
+from pivoting.sim.fidelity import Held, held
 
 Array = NDArray[np.float64]
 POSE = ("position", "quaternion", "velocity", "angular_velocity")

@@ -23,20 +23,20 @@ def contacts_of(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> list[t
 
 
 def contact_margin(model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody) -> float:
-    """How far from its support the body is held [m]: the margin, less the gap, of the contacts that `data` has."""
+    """How far from its support the body is held [m]: the margin of the contacts that `data` has."""
     held = contacts_of(model, data, body.index)
     return max((float(contact.includemargin) for _, other, contact in held if other == body.support), default=0.0)
 
 
-def refuse_strays(model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody) -> None:
-    """The object may touch nothing but its support at the start.
+def refuse_strays(model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody, unit: float = 1.0) -> None:
+    """The object may touch nothing but its support at the start, in a model whose lengths are in `unit` [m].
 
     Raises:
         ModelError: it does; both geoms are named.
     """
     for own, other, contact in contacts_of(model, data, body.index):
         if other != body.support:
-            deep = f"by {-1e3 * float(contact.dist):.3g} mm" if contact.dist < 0.0 else "within its margin"
+            deep = f"by {-1e3 * unit * float(contact.dist):.3g} mm" if contact.dist < 0.0 else "within its margin"
             told = f"where it starts, its geom {label(model, own)} is in {label(model, other)} {deep}"
             support = label(model, body.support)
             raise ModelError(f"body = {body.name!r}: {told}; must touch nothing but its support {support}")

@@ -18,7 +18,7 @@ TRACKING = ("angle_error_rms_deg", "angle_error_max_deg")  # checks of the angle
 
 @dataclass(frozen=True)
 class Limits:
-    """Thresholds of a verdict; all but the slip count after `settle_s`.
+    """Thresholds of a verdict; angles, lost contact, friction and forces count after `settle_s`, all else always.
 
     Attributes:
         slip_m: displacement of the material corner along the table [m]; None, whatever the unit of length: `slip_rel`
@@ -51,6 +51,9 @@ class Limits:
         for name, value in vars(self).items():
             if name != "slip_m" or value is not None:
                 number(f"limits.{name}", value, at_least=0.0)
+        if not float(self.contacts_end).is_integer():
+            raise fail("limits.contacts_end", self.contacts_end, "a whole number")
+        object.__setattr__(self, "contacts_end", int(self.contacts_end))
 
     def for_object(self, lever: float, gravity: float) -> "Limits":
         """These limits for an object with a lever [m] under gravity [m/s^2]: that on its slip is a length."""

@@ -233,7 +233,7 @@ def test_an_object_of_ones_own(tmp_path: Path) -> None:
         ([*own, "--contact", ""], "contact = ''"),
         ([*own, "--contact", "edge"], "contact = 'edge'"),
         ([*own, "--set", "size=1"], "size = 1: the body is not a box"),
-        ([*own, "--set", "theta_end=170"], "reference = .*angles from 5 to 170 deg"),
+        ([*own, "--set", "theta_end=170"], r"theta = 5 and theta_end = 170 deg: about .* can be turned within \["),
         ([*own, "--support", "moon"], "support = 'moon'"),
         (["run", "pivot", "--model", str(tmp_path), "--body", "can"], "it is a directory"),
     ):

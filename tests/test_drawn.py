@@ -76,6 +76,11 @@ def test_the_polygon_closes_where_all_was_given(case: tuple[str, Run], tmp_path:
     solved, bounded = run.status[0, k] == 0, run.status[0, k] == BOUNDED
     assert solved.any()
     assert weights[solved].max() < 1e-12
+    every = [
+        run.attached.controller.jacobian(q) @ f[0] for q, f in zip(run.quaternion[0, :-1], run.force[0], strict=True)
+    ]
+    gaps = (run.required[0] - run.wrench[0] - every)[run.status[0] == 0]  # also of the steps that are not drawn
+    assert np.abs(gaps).max() < 1e-12 * run.load.force
     assert bounded.any() == (name in SHORT)
     assert (solved | bounded).all()
     assert (weights[bounded] > 1e-6).all()

@@ -9,6 +9,8 @@ from pathlib import Path
 from time import monotonic, sleep
 
 import pytest
+from pivoting.sim import Run
+from pivoting.sim.results import save
 
 from tests.processes import started
 
@@ -66,10 +68,29 @@ def test_in_the_loop(tmp_path: Path, times: int) -> None:
 
 
 def test_while_results_are_written(tmp_path: Path) -> None:
-    """Neither of the two files, and nothing in their stead."""
+    """None of the files, and nothing in their stead."""
     process = started("run", "balance-2d", "--out", str(tmp_path))
     interrupted_when(lambda: any(path.suffix == ".part" for path in tmp_path.iterdir()), process)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_results_appear_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shipped: Callable[[str], Run]
+) -> None:
+    """An interrupt between two of them comes when all are there."""
+    replace = Path.replace
+
+    def interrupted(part: Path, target: Path) -> Path:
+        if target.suffix == ".json":
+            signal.raise_signal(signal.SIGINT)
+        return replace(part, target)
+
+    monkeypatch.setattr(Path, "replace", interrupted)
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        save(shipped("snap-2d"), tmp_path)
+    assert signal.getsignal(signal.SIGINT) is before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["snap-2d.rrd", "snap-2d.summary.json", "summary.json"]
 
 
 LIBRARY = """
@@ -86,6 +107,13 @@ def renamed():  # as C extensions do whose imports fail
     except KeyboardInterrupt:
         raise ImportError("numpy.core.multiarray failed to import") from None
 
+def twice():  # the second while what is open is tidied up
+    try:
+        signal.raise_signal(signal.SIGINT)
+    finally:
+        signal.raise_signal(signal.SIGINT)
+        print("tidied up", file=sys.stderr)
+
 class Finder:
     def find_spec(self, name, path=None, target=None):
         if name == "mujoco":
@@ -96,12 +124,13 @@ main()
 """
 
 
-@pytest.mark.parametrize("what", ["lost", "renamed"])
-def test_whatever_a_library_makes_of_it(what: str) -> None:
+@pytest.mark.parametrize(("what", "first"), [("lost", []), ("renamed", []), ("twice", ["tidied up"])])
+def test_whatever_a_library_makes_of_it(what: str, first: list[str]) -> None:
     call = [sys.executable, "-c", LIBRARY.replace("{what}", what), "list"]
     done = subprocess.run(call, capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stdout) == (130, "")
-    assert [line for line in done.stderr.splitlines() if not line.startswith("pivoting: compiling")] == [LINE]
+    told = [line for line in done.stderr.splitlines() if not line.startswith("pivoting: compiling")]
+    assert told == [*first, LINE]
 
 
 def test_a_job_in_the_background_is_left_alone() -> None:

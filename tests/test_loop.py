@@ -1,12 +1,17 @@
 """The closed loop: what it must show in MuJoCo, determinism, and what a run is made of."""
 
 from collections.abc import Callable
+from dataclasses import fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from pivoting.controller import Motion, WrenchController, solve
+from pivoting.controller import Motion, WrenchController, WrenchProblem, solve
+from pivoting.controller.controller import Belief
 from pivoting.controller.references import Constant, Sampled
-from pivoting.sim import SCENARIOS, Run, assert_sticking, assert_tracking, simulate
+from pivoting.sim import SCENARIOS, Run, assert_sticking, assert_tracking, own_object, simulate
 from pivoting.sim.control import BOUNDED
 from scipy.spatial.transform import Rotation
 
@@ -178,6 +183,59 @@ def test_a_controller_of_ones_own_is_named_and_brings_its_own_settings(shipped: 
         simulate("balance-2d", controller=two)
 
 
+def test_a_controller_that_would_not_be_asked_is_refused(shipped: Callable[[str], Run]) -> None:
+    """A test that does not test what it is given is the worst outcome; what the loop does read may be another's."""
+    mine = shipped("balance-2d").attached.controller
+    given = {each.name: getattr(mine, each.name) for each in fields(WrenchController)}
+
+    class Mine(WrenchController):
+        def problem(self, *arguments: Any, **options: Any) -> WrenchProblem:
+            raise AssertionError("never called")
+
+    class Turned(WrenchController):
+        def jacobian(self, orientation: np.ndarray) -> np.ndarray:
+            return -super().jacobian(orientation)
+
+    class Heavier(WrenchController):
+        @cached_property
+        def belief(self) -> Belief:
+            return super().belief._replace(mass=1.2)
+
+    for kind, name in ((Mine, "problem"), (Turned, "jacobian")):
+        with pytest.raises(
+            ValueError, match=rf"^controller = '{kind.__name__}': must be without a {name}\(\) of its own"
+        ):
+            simulate("balance-2d", controller=kind(**given), seconds=0.6)
+    patched = WrenchController(**given)
+    object.__setattr__(patched, "problem", lambda *arguments: None)
+    with pytest.raises(ValueError, match=r"^controller = 'WrenchController': must be without a problem"):
+        simulate("balance-2d", controller=patched, seconds=0.6)
+    assert simulate("balance-2d", controller=Heavier(**given), seconds=0.6).verdict == "fail"
+    assert (
+        simulate("balance-2d", controller=type("Same", (WrenchController,), {})(**given), seconds=0.6).verdict == "pass"
+    )
+
+
+@pytest.mark.parametrize("gravity", ['<option gravity="0 0 0"/>', '<option><flag gravity="disable"/></option>'])
+def test_no_gravity_in_the_file_is_refused_as_none_on_the_command_line(gravity: str, tmp_path: Path) -> None:
+    model = tmp_path / "box.xml"
+    model.write_text(
+        f"""<mujoco>{gravity}<worldbody><geom type="plane" size="1 1 1"/><body name="box" pos="0 0 .1"><freejoint/>
+        <geom type="box" size=".05 .04 .1" mass=".4"/></body></worldbody></mujoco>"""
+    )
+    case = own_object(model, "box", "edge")
+    for given in (case, case.change(seconds="9T"), case.change(force_max="1w")):
+        with pytest.raises(ValueError, match=r"^gravity = 0.0: must be > 0, or f_min > 0"):
+            simulate(given)
+    with pytest.raises(ValueError, match=r"^f_min = '1w': must be a number \[N\]: without gravity"):
+        simulate(case, f_min="1w")
+
+
+def test_too_many_worlds_are_named() -> None:
+    with pytest.raises(ValueError, match=r"^worlds = 10000000000000: must be at most 1000: of 10000 steps each"):
+        simulate("balance-2d", worlds=10**13)
+
+
 @pytest.mark.parametrize("incline", [1.0, 5.0])
 def test_what_is_measured_is_measured_from_the_worlds_table(incline: float) -> None:
     """A table that the controller does not know of: the corner and the angle, from MuJoCo's poses alone."""
@@ -231,7 +289,7 @@ def test_a_reference_that_starts_in_motion() -> None:
         ({"reference": np.array([0.5, 0.6])}, "reference = 'ndarray'.*Sampled"),
         ({"reference": lambda t: (np.full(t.shape, np.nan), 0 * t, 0 * t)}, "reference = .*angle.*finite"),
         ({"reference": lambda t: (0.5, 0.0, 0.0)}, "reference = .*shape"),
-        ({"reference": Constant(2.0)}, "reference = .*114.592"),
+        ({"reference": Constant(2.0)}, "theta = 114.592 deg.*it can be turned within"),
         ({"law": "magic"}, "law = 'magic'.*dynamic"),
         ({"reference": "spiral"}, "reference = 'spiral'.*arc"),
         ({"masss": 1.0}, "masss = 1.0.*known key"),

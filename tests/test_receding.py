@@ -5,7 +5,7 @@ import pytest
 from pivoting.controller import Body, BodyState, Contact, Horizon, Law, Plan, Planner, WrenchBounds, WrenchController
 from pivoting.controller.receding import Followed, RecedingHorizon, followed_motion
 from pivoting.controller.so3 import rotated
-from pivoting.controller.space import space
+from pivoting.controller.space import quaternion_product, space
 
 G, H = 10.0, 0.02
 CORNERS = np.array([[0.5, 0.0, -0.5], [-0.5, 0.0, 0.5]])  # that come down next
@@ -131,3 +131,19 @@ def test_plans_go_on_from_the_last_one() -> None:
 def test_a_period_longer_than_the_horizon_is_refused() -> None:
     with pytest.raises(ValueError, match=r"period = 0\.5: must be > 0 and not longer than the horizon"):
         RecedingHorizon(receding().planner, 0.5)
+
+
+def test_a_state_a_little_off_the_plane_is_planned_from_as_the_per_step_law_sees_it() -> None:
+    """Measurements are never exactly in the plane; a degree beyond it is no planar state."""
+
+    def leaning(by: float) -> BodyState:
+        about_x = np.array([np.cos(0.5 * by), np.sin(0.5 * by), 0.0, 0.0])
+        return at(0.5)._replace(orientation=quaternion_product(about_x, at(0.5).orientation))
+
+    plain = receding().replan(at(0.5), towards(0.5, 0.8), None)
+    near = receding().replan(leaning(np.deg2rad(0.1)), towards(0.5, 0.8), None)
+    assert near.plan is not None
+    assert plain.plan is not None
+    np.testing.assert_allclose(near.plan.wrench, plain.plan.wrench, atol=1e-6)
+    with pytest.raises(ValueError, match=r"orientation = .*within 1 deg of the controller's plane"):
+        receding().replan(leaning(np.deg2rad(2.0)), towards(0.5, 0.8), None)

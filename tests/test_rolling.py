@@ -13,6 +13,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 from pivoting.controller import Body, Contact, Law, Motion, WrenchController
 from pivoting.controller.controller import world_wrench
 from pivoting.controller.rotations import Turn
@@ -168,19 +169,28 @@ def test_what_turns_and_pushes_is_what_was_commanded(pill: Run) -> None:
     np.testing.assert_allclose(pushed, pill.truth.mass * np.diff(pill.velocity[0], axis=0) / pill.dt, atol=1e-3)
 
 
+def sticking(run: Run, point: ArrayLike) -> WrenchController:
+    """A controller that believes that a point (3,) in the body frame stays put."""
+    mine, body = run.attached.controller, run.attached.body
+    contact = replace(mine.contacts[0], point=body.point(point), radius=0.0)
+    return WrenchController(mine.body, [contact], mine.law, body.gravity, base=body.table, margin=0.2)
+
+
 def test_a_radius_that_is_left_out_is_caught(pill: Run, tmp_path: Path) -> None:
     """The controller believes that the cap's centre, or the point of it that is down on its side, stays put."""
     centre = pill.truth.com + pill.points[0]
-    left_out = attach(pill.model, body="b", contacts=[centre], margin=0.2).controller
-    run = simulate(pill.scenario, controller=left_out)  # on a level table, at leisure, f_t has little moment about it
+    with pytest.raises(ModelError, match=r"contacts\[0\] = .*: 0.03 m off the surface .* give its radius"):
+        attach(pill.model, body="b", contacts=[centre])
+    run = simulate(
+        pill.scenario, controller=sticking(pill, centre)
+    )  # on a level table, at leisure, f_t has little moment about it
     assert run.measures.force_mismatch_rel[0] > 0.03 > 100.0 * pill.measures.force_mismatch_rel.max()
     assert np.abs(turning(run)).max() > 0.5
     case = own(tmp_path, mjcf(PILL, table='euler="0 20 0"'), "vertex")
     right = simulate(case)
     assert right.verdict == "pass"
     for point in (centre, [0.03, 0.0, -0.07]):
-        wrong = attach(right.model, body="b", contacts=[point], margin=0.2).controller
-        assert simulate(case, controller=wrong).verdict == "fail"
+        assert simulate(case, controller=sticking(right, point)).verdict == "fail"
 
 
 def test_slip_is_counted_from_rolling(pill: Run) -> None:
