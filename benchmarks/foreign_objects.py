@@ -106,7 +106,8 @@ def examined(path: Path, kind: str, variant: str, summary: dict[str, Any]) -> tu
         radius=run.radius,
         table=table,
         desired=run.desired[0],
-        force=np.nan_to_num(run.force[0]).sum(axis=1) @ table.T,
+        height=float(run.truth.origin @ table[:, 2]),
+        force=np.nan_to_num(run.force[0]) @ table.T,
         settle=round(run.scenario.limits.settle_s / run.dt),
     )
     facts = replay(tape)

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-NEAR = 0.02  # of the lever: a contact that close to what is held is one of it
+NEAR = 2e-3  # of the lever: a contact that close to what is held is one of it
 CARRIES = 1e-6  # of the weight: less is no load
+LIFTED = 1e-4  # of the lever: what is higher has left the table
 USED_UP = 0.999  # of the friction
 
 
@@ -24,9 +25,9 @@ class Tape(NamedTuple):
         model, body: the body's index in it.
         qpos (nq,), qvel (nv,): at the start.  wrench: (N, 6) force and torque at the CoM, world axes.
         held: (K, 3) what is to stick, or the centres of what is to roll, body frame [m].  radius: (K,) of that, else 0.
-        table: (3, 3) columns (t, o, n), world axes.
+        table: (3, 3) columns (t, o, n), world axes.  height: of its surface along n [m].
         desired: (N+1, 4) orientations of the body, to world.
-        force: (N, 3) net contact force that was predicted, world axes.
+        force: (N, K, 3) contact forces that were predicted, world axes.
         settle: steps that do not count.
     """
 
@@ -38,6 +39,7 @@ class Tape(NamedTuple):
     held: Array
     radius: Array
     table: Array
+    height: float
     desired: Array
     force: Array
     settle: int
@@ -53,7 +55,9 @@ class Facts(NamedTuple):
         others: seconds in which something else carries, by the two geoms that meet.
         deepest_m: greatest penetration.
         angle_rms_deg, angle_max_deg: off the desired orientation.
-        mismatch: RMS of net contact force less the predicted over RMS of the predicted.
+        mismatch: RMS of contact forces less the predicted over RMS of the predicted; of two that are held, what acts
+            between them is shared by its distance from both.
+        unanswered: steps without a wrench.
         diverged_s: when the state was no longer finite, else inf.
     """
 
@@ -65,6 +69,7 @@ class Facts(NamedTuple):
     angle_rms_deg: float
     angle_max_deg: float
     mismatch: float
+    unanswered: int
     diverged_s: float
 
 
@@ -93,32 +98,34 @@ def replay(tape: Tape) -> Facts:
         slips.append(float(np.linalg.norm((held - first - rolled)[:, :2], axis=1).max()))
         rolled = rolled + dt * np.cross(omega @ tape.table, np.outer(tape.radius, [0.0, 0.0, 1.0]))
         found = [*_contacts(model, data, tape.body)]
-        carrying = [row for row in found if row.normal > CARRIES * weight]
         if k < tape.settle:
             continue
-        near = NEAR * lever
-        away = [_away((row.at - data.xpos[tape.body]) @ R, tape) for row in carrying]
-        mine = [row for row, distance in zip(carrying, away, strict=True) if distance <= near]
-        lifted = (held - first)[:, 2].max() > 1e-4 * lever
-        lost += not mine or bool(lifted)
+        points = [(row.at - data.xpos[tape.body]) @ R for row in found]
+        away = [_away(point, tape) > NEAR * lever for point in points]
+        carrying = [row.normal > CARRIES * weight for row in found]
+        mine = [row for row, other, loaded in zip(found, away, carrying, strict=True) if loaded and not other]
+        lost += not mine or bool(held[:, 2].max() - tape.height > LIFTED * lever)
         slides += any(row.tangential >= USED_UP * row.mu * row.normal for row in mine)
-        for pair in {row.pair for row, distance in zip(carrying, away, strict=True) if distance > near}:
+        for pair in {row.pair for row, other, loaded in zip(found, away, carrying, strict=True) if loaded and other}:
             others[pair] = others.get(pair, 0.0) + dt
         deepest = max([deepest, *(row.depth for row in found)])
         angles.append(_angle(data.xquat[tape.body], tape.desired[k]))
-        off.append(np.sum([row.force for row in found], axis=0) - tape.force[k] if found else -tape.force[k])
+        off.append(-tape.force[k])
+        for row, point, other in zip(found, points, away, strict=True):
+            off[-1] = off[-1] + (not other) * _shares(point, tape)[:, None] * row.force
         wanted.append(tape.force[k])
     rms = [float(np.sqrt(np.nanmean(np.square(values)))) if len(values) else np.nan for values in (off, wanted, angles)]
     return Facts(
-        max(slips),
-        lost * dt,
-        slides * dt,
-        others,
-        deepest,
-        rms[2],
-        max(angles, default=np.nan),
-        rms[0] / rms[1],
-        diverged,
+        slip_m=max(slips),
+        lost_s=lost * dt,
+        slides_s=slides * dt,
+        others=others,
+        deepest_m=deepest,
+        angle_rms_deg=rms[2],
+        angle_max_deg=max(angles, default=np.nan),
+        mismatch=rms[0] / rms[1],
+        unanswered=int(np.isnan(tape.wrench).any(axis=1).sum()),
+        diverged_s=diverged,
     )
 
 
@@ -153,11 +160,18 @@ def _contacts(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> list[_Ro
     return out
 
 
+def _shares(point: Array, tape: Tape) -> Array:
+    """(K,) shares of a force at a point, body frame, that a point that is held or the two ends of a line carry."""
+    if len(tape.held) == 1:
+        return np.ones(1)
+    a, b = tape.held
+    share = float(np.clip((point - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0))
+    return np.array([1.0 - share, share])
+
+
 def _away(point: Array, tape: Tape) -> float:
-    """Distance of a point in the body frame from what is held: points, the line between two, or a ball's surface."""
-    a, b = tape.held[0], tape.held[-1]
-    share = np.clip((point - a) @ (b - a) / max(float((b - a) @ (b - a)), 1e-300), 0.0, 1.0)
-    return float(abs(np.linalg.norm(point - a - share * (b - a)) - tape.radius[0]))
+    """Distance of a point in the body frame from what is held: a point, the line between two, or a ball's surface."""
+    return float(abs(np.linalg.norm(point - _shares(point, tape) @ tape.held) - tape.radius[0]))
 
 
 def _angle(one: Array, other: Array) -> float:
@@ -178,17 +192,18 @@ def confirms(sentence: str, facts: Facts, limits: dict[str, float], lever: float
         limits: of its verdict.
         lever: [m].
     """
+    tilts = facts.angle_rms_deg <= limits["angle_rms_deg"] and facts.angle_max_deg <= limits["angle_max_deg"]
     claims = {
-        r"slip|slid": facts.slip_m > limits["slip_m"] or facts.slides_s > 0.0,
-        r"friction_use|friction (is )?used|cone": facts.slides_s > 0.0,
-        r"contact_lost|lets? go|left the table|lifts? off|bounc|no contact": facts.lost_s > 0.0,
-        r"undeclared|touche[sd]|another": bool(facts.others),
-        r"penetrat|deep|sinks": facts.deepest_m > limits.get("penetration_rel", 0.01) * lever,
-        r"angle|tilt|RMS": not (
-            facts.angle_rms_deg <= limits["angle_rms_deg"] and facts.angle_max_deg <= limits["angle_max_deg"]
-        ),
-        r"force_mismatch|predicted (contact )?force": not facts.mismatch <= limits["force_mismatch_rel"],
-        r"diverge": facts.diverged_s < np.inf,
+        r"crept|slip_max": facts.slip_m > limits["slip_m"],
+        r"\bslid\b|friction_use": facts.slides_s > 0.0,
+        r"let go|left the table|contact_lost|bounc": facts.lost_s > 0.0,
+        r"touches|undeclared": bool(facts.others),
+        r"deeper|penetration": facts.deepest_m > limits["penetration_rel"] * lever,
+        r"angle": not tilts,
+        r"contact force|force_mismatch": not facts.mismatch <= limits["force_mismatch_rel"],
+        r"no certified answer|unsolved": facts.unanswered > 0,
+        r"diverged": facts.diverged_s < np.inf,
     }
-    made = [true for pattern, true in claims.items() if re.search(pattern, sentence)]
+    said = re.sub(r"'[^']*'", "", sentence)  # names of geoms are no claims
+    made = [true for pattern, true in claims.items() if re.search(pattern, said)]
     return bool(made) and all(made)
