@@ -250,7 +250,9 @@ def _interval(body: Hull, held: Held, up: Array, inward: Array, some: Indices | 
     v = vectors[..., 1] * np.sign((vectors[..., 1] * c).sum(axis=-1, keepdims=True))
     half = np.arctan2(np.sqrt(np.maximum(values[..., 1], 0.0)), np.sqrt(np.maximum(-values[..., 0], 0.0)))
     lowest = np.stack([body.lowest(way, wide) for way in inward])
-    own = _between(held, lowest, body.reach) | np.isin(wide, _rim(body, held))
+    own = _between(held, lowest, body.reach)  # about a line a rim stays put only if that is its tangent
+    if len(held.points) == 1:
+        own = own | np.isin(wide, _rim(body, held))
     half[own], v[own] = 0.5 * np.pi, c[own]  # a half-plane: of a rim that the points are on
     angle = np.arctan2(v[..., 1], v[..., 0])
     return np.maximum(low, (angle - half).max(axis=1)), np.minimum(high, (angle + half).min(axis=1))

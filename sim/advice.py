@@ -46,9 +46,11 @@ class _Case:
 
     @property
     def world(self) -> int:
+        """Its index."""
         return self.run.worst_world
 
     def failed(self, name: str) -> bool:
+        """Whether it is over the limit of the check of that name."""
         return any(check.name == name and bool(check.failed[self.world]) for check in self.run.checks)
 
     @property

@@ -330,6 +330,7 @@ class Run:
             "remedies": [remedy.setting for remedy in remedies(self)],
             "undeclared_contacts": self.strays,
             "support": geom_name(self.model, self.truth.support),
+            "contact": "; ".join(",".join(f"{x:.9g}" for x in point) for point in self._in_file),
             "object": self.object,
             "contact_settings": self.contact_settings,
             "events": [event._asdict() for event in self.events],
@@ -339,21 +340,22 @@ class Run:
         }
 
     @property
-    def object(self) -> dict[str, Any]:
-        """What was read of the object, as the world has it, in the frame that its file gives the body.
-
-        `contact` is what --contact takes, in the file's own unit of length.
-        """
+    def _in_file(self) -> Array:
+        """(K, 3) the contacts as --contact takes them, in the frame and unit of length that the file gives the body."""
         origin, axes = file_frame(self.model, self.truth.index)
-        contacts = (self.truth.com + self.points @ matrix(self.truth.axes).T - origin) @ axes
+        return (self.truth.com + self.points @ matrix(self.truth.axes).T - origin) @ axes
+
+    @property
+    def object(self) -> dict[str, Any]:
+        """What was read of the object, as the world has it, in the frame that its file gives the body."""
+        origin, axes = file_frame(self.model, self.truth.index)
         return {
             "support": geom_name(self.model, self.truth.support),
             "mass_kg": self.truth.mass,
             "inertia_kg_m2": (self.unit**2 * np.asarray(self.truth.inertia)).tolist(),
             "com_m": (self.unit * (self.truth.com - origin) @ axes).tolist(),
             "mu": self.mu_world,
-            "contacts_m": (self.unit * contacts).tolist(),
-            "contact": "; ".join(",".join(f"{x:.9g}" for x in point) for point in contacts),
+            "contacts_m": (self.unit * self._in_file).tolist(),
             "radius_m": (self.unit * self.radius).tolist(),
             "damping": 0.0 if self.truth.drag is None else float(self.truth.drag.damping.max()),
             "frictionloss": 0.0 if self.truth.drag is None else float(self.truth.drag.friction.max()),

@@ -48,7 +48,7 @@ def test_while_libraries_are_imported(library: str) -> None:
 @pytest.mark.parametrize("later", [0.0, 2.0])
 def test_while_kernels_are_compiled(tmp_path: Path, later: float) -> None:
     """After which the cache is whole: the same call goes on from it."""
-    process = started("example", "--json", env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)})
+    process = started("run", "balance-2d", "--json", env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)})
     assert process.stderr is not None
     assert process.stderr.readline().startswith("pivoting: compiling")
     sleep(later)

@@ -51,9 +51,9 @@ def test_dynamic_gives_the_acceleration_it_asks_for(theta: float, omega: float) 
     controller = WrenchController(BLOCK, [CORNER], law, (0.0, -10.0))
     state = Motion(theta, omega)
     wrench = controller.problem(state, desired).required
-    spec = load(scene_path("balance-2d"), {"dt": 1e-5})
-    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-    model = spec.compile()
+    scene = load(scene_path("balance-2d"), {"dt": 1e-5})
+    scene.spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    model = scene.compile()
     data = mujoco.MjData(model)
     data.qpos[2] = theta
     R = np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])

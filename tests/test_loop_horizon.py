@@ -126,7 +126,7 @@ def test_a_plan_that_is_impossible_is_an_error_with_its_evidence() -> None:
     [
         ({"plan_hz": 1.0}, "plan_hz = 1.0: must be such that a plan is made every 0.001 s"),
         ({"plan_steps": 2.5}, "plan_steps = 2.5: must be a whole number"),
-        ({"plan_steps": float("inf")}, "plan_steps = inf: must be a whole number"),
+        ({"plan_steps": float("inf")}, "plan_steps = inf: must be a finite number >= 1"),
         ({"integrator": "rk4"}, "integrator = 'rk4': must be one of quasi-dynamic, implicit, semi-implicit, forward"),
         ({"force_max": 0.0}, "force_max = 0.0: must be a finite number > 0"),
         ({"track": -1.0}, "track = -1.0: must be a finite number > 0"),

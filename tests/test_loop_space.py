@@ -227,7 +227,7 @@ def test_a_planar_object_of_ones_own(tmp_path: Path) -> None:
     run = turn_object(tmp_path, WEDGE, "lowest")
     assert run.truth.dim == 2
     assert run.verdict == "pass"
-    with pytest.raises(ValueError, match=r"must be in \[0.1, 116.5\] deg"):
+    with pytest.raises(ValueError, match=r"theta_end = 130 deg: .* within \[0.1, 116.465\] deg, then the corner"):
         turn_object(tmp_path, WEDGE, "lowest", theta_end=130.0)
     refused(tmp_path, WEDGE, "no corner of body 'b'", [0.0, 0.0, 0.05])
     refused(tmp_path, WEDGE, "one lowest corner", [0.05, 0.0, 0.1])
