@@ -44,7 +44,7 @@ study: $(STAMP)  ## how fast each formulation can pivot, and what a horizon save
 	$(BIN)/python benchmarks/bench_formulations.py --json benchmarks/results/formulations.json
 	$(BIN)/python benchmarks/bench_effort.py --json benchmarks/results/effort.json
 
-objects: $(STAMP)  ## objects out of published packages, fetched (270 MB) and pivoted
+objects: $(STAMP)  ## objects out of published packages, fetched (560 MB) and pivoted
 	$(BIN)/python benchmarks/foreign_objects.py --json benchmarks/results/objects.json
 
 figures: $(STAMP)  ## the pictures that README.md and docs/formulations.md show
