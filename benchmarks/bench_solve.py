@@ -18,7 +18,7 @@ import numpy as np
 from harness import main, peer_table, timed
 from pivoting.controller import ClarabelWorkspace, WrenchProblem, methods, pyramid_excess, solve
 from pivoting.controller.conic import CLARABEL, ConicForm, conic_form
-from pivoting.controller.dispatch import smallest_wrench, workspace
+from pivoting.controller.dispatch import solve_one, workspace
 from pivoting.controller.validate import Array
 from rich import print as show
 from rich.markdown import Markdown
@@ -68,7 +68,7 @@ def kernel(first: Instance) -> Route:
     """The compiled entry, called with arrays and a workspace that the caller keeps and writes each problem into."""
     nw, n = first.problem.jacobian.shape
     held, f, w = [np.array(values, order="C") for values in first.data], np.empty(n), np.empty(nw)
-    reduced, scratch = workspace(nw, first.problem.contacts, first.problem.dim)
+    work = workspace(nw, first.problem.contacts, first.problem.dim)
 
     def prepare(it: Instance) -> tuple[Array, ...]:
         for mine, theirs in zip(held, it.data, strict=True):
@@ -76,7 +76,7 @@ def kernel(first: Instance) -> Route:
         return tuple(held)
 
     def run(J: Array, b: Array, Q_w: Array, Q_f: Array, mu: Array, f_min: Array) -> Array:
-        smallest_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, reduced, scratch)
+        solve_one(J, b, Q_w, Q_f, mu, f_min, f, w, *work)
         return f
 
     return prepare, run

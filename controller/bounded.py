@@ -14,7 +14,7 @@ from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.conic_program import ClarabelInPlace, Cones, ConicProgram
 from pivoting.controller.contact_set import free_axes
 from pivoting.controller.controller import WrenchController
-from pivoting.controller.kernel import kernel
+from pivoting.controller.kernel import allocating
 from pivoting.controller.limits import friction_limits, wrench_limits
 from pivoting.controller.space import component, cross, fill_rotation, into
 from pivoting.controller.validate import Array, number
@@ -129,7 +129,7 @@ class BoundedSolver:
         )  # fmt: skip
 
 
-@kernel
+@allocating
 def _fill_turning(axes, q, belief, scale, out):  # type: ignore[no-untyped-def]
     """Write -B (nw, A), the wrenches that accelerate the object about its free axes, with entries up to 1, in `scale`.
 

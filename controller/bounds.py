@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pivoting.controller.kernel import kernel
+from pivoting.controller.kernel import allocating, subroutine
 from pivoting.controller.validate import Array, fail
 
 
@@ -113,7 +113,7 @@ class WrenchBounds:
         return float(out.max(initial=-1.0))
 
 
-@kernel
+@allocating
 def fill_excess(stacked, wrench, before, dt, out):  # type: ignore[no-untyped-def]
     """Write by how much each of wrenches (W, nw) exceeds a bound, relative to it, into out (W,); -1 without any bound.
 
@@ -137,7 +137,7 @@ def fill_excess(stacked, wrench, before, dt, out):  # type: ignore[no-untyped-de
     return most
 
 
-@kernel
+@subroutine
 def size_over(stacked, k, vector):  # type: ignore[no-untyped-def]
     """|rows v| over the radius of ball k, v (nw,) a wrench or its rate."""
     square = 0.0
@@ -149,7 +149,7 @@ def size_over(stacked, k, vector):  # type: ignore[no-untyped-def]
     return np.sqrt(square) / stacked.radius[k]
 
 
-@kernel
+@subroutine
 def farthest_exceeded(stacked, wrench):  # type: ignore[no-untyped-def]
     """The ball, not of a rate, that a wrench (nw,) exceeds the farthest; -1 if it is within all."""
     found, worst = -1, 1.0
@@ -160,17 +160,18 @@ def farthest_exceeded(stacked, wrench):  # type: ignore[no-untyped-def]
     return found
 
 
-@kernel
+@subroutine
 def begin_multiplier(stacked, k, Q_w, root):  # type: ignore[no-untyped-def]
     """Make `root` (6,) ready for `next_multiplier`: (multiplier, the last, its 1 / size - 1, bracket, unit)."""
     row = stacked.rows[stacked.first[k]]
-    root[:] = 0.0
+    for j in range(6):
+        root[j] = 0.0
     root[4] = np.inf
     for j in range(row.shape[0]):
         root[5] += row[j] * Q_w[j, j] * row[j]
 
 
-@kernel
+@subroutine
 def next_multiplier(root, size):  # type: ignore[no-untyped-def]
     """Write the multiplier to try after root[0] gave `size` over the radius, which falls as the multiplier grows.
 
@@ -190,14 +191,14 @@ def next_multiplier(root, size):  # type: ignore[no-untyped-def]
     root[0], root[1], root[2] = guess, now, value
 
 
-@kernel
+@subroutine
 def fill_heavier(stacked, k, multiplier, Q_w, out):  # type: ignore[no-untyped-def]
     """Write Q_w + multiplier rows' rows of ball k: where that makes |rows w| the radius, w is the best within it.
 
     The Lagrangian of the bound, 1/2 multiplier (|rows w|^2 - radius^2), is a weight.
     """
-    out[:] = Q_w
-    for row in range(stacked.first[k], stacked.first[k + 1]):
-        for i in range(out.shape[0]):
-            for j in range(out.shape[0]):
+    for i in range(out.shape[0]):
+        for j in range(out.shape[0]):
+            out[i, j] = Q_w[i, j]
+            for row in range(stacked.first[k], stacked.first[k + 1]):
                 out[i, j] += multiplier * stacked.rows[row, i] * stacked.rows[row, j]

@@ -8,11 +8,11 @@ inscribed pyramid they are the same with |f_t| replaced by the gauge of its poly
 """
 
 import numpy as np
-from pivoting.controller.kernel import kernel
+from pivoting.controller.kernel import kernel, subroutine
 
 
-@kernel
-def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, vertices=None, facets=None):  # type: ignore[no-untyped-def]
+@subroutine
+def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, pull, vertices=None, facets=None):  # type: ignore[no-untyped-def]
     """The largest of four relative residuals: equilibrium, friction cones, dual cones, duality gap.
 
     Each is a backward error: relative to the sum of the absolute values of the terms that it is made of (Oettli and
@@ -23,6 +23,7 @@ def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, vertices=None, facets=None):  
 
     Args:
         J: (nw, K d); b, w: (nw,); f: (K d,); Q_w: (nw, nw); Q_f: (K d, K d); mu (planned), f_min: (K,).
+        pull: (2, nw) scratch, for Q_w w and |Q_w||w|.
         vertices, facets: (m, 2) of the polygon that stands for the unit disc, see `polygon`; None for the disc.
     """
     nw, n = J.shape
@@ -37,8 +38,8 @@ def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, vertices=None, facets=None):  
         worst_w, size_w = max(worst_w, abs(sum_w)), max(size_w, abs_w)
         if i < dim:
             size_f = max(size_f, abs_w)
-    pull = np.zeros((2, nw))  # Q_w w, and with absolute values
     for i in range(nw):
+        pull[0, i] = pull[1, i] = 0.0
         for j in range(nw):
             pull[0, i] += Q_w[i, j] * w[j]
             pull[1, i] += abs(Q_w[i, j] * w[j])
@@ -80,7 +81,7 @@ def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, vertices=None, facets=None):  
     )
 
 
-@kernel
+@subroutine
 def _most(rows, x, y):  # type: ignore[no-untyped-def]
     """max over rows (m, 2) of row . (x, y)."""
     most = -np.inf
@@ -89,9 +90,12 @@ def _most(rows, x, y):  # type: ignore[no-untyped-def]
     return most
 
 
-@kernel
+@subroutine
 def _ratio(worst, size):  # type: ignore[no-untyped-def]
     """worst / size, where nothing out of nothing is no error."""
     if worst == 0.0 and size == 0.0:
         return 0.0
     return worst / size
+
+
+certified_residual = kernel(kkt_residual)  # called from Python

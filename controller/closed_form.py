@@ -6,12 +6,12 @@ f = (0, f_min) is in the cone whatever b is. This is erratum 6 of the notes: eli
 """
 
 import numpy as np
-from pivoting.controller.kernel import kernel
+from pivoting.controller.kernel import subroutine
 
 SMALL = 1e-15  # relative optimality at which a candidate is taken without looking at the others
 
 
-@kernel
+@subroutine
 def reduce(J, b, Q_w, Q_f, H, h, row):  # type: ignore[no-untyped-def]
     """Write H = Q_f + J'Q_w J (n, n) and h = J'Q_w b (n,) of the problem in f alone; row (n,) is scratch."""
     nw, n = J.shape
@@ -37,13 +37,13 @@ def reduce(J, b, Q_w, Q_f, H, h, row):  # type: ignore[no-untyped-def]
             H[j, i] = H[i, j]
 
 
-@kernel
+@subroutine
 def _gradient(H, h, t, n):  # type: ignore[no-untyped-def]
     """H f - h at f = (t, n)."""
     return H[0, 0] * t + H[0, 1] * n - h[0], H[1, 0] * t + H[1, 1] * n - h[1]
 
 
-@kernel
+@subroutine
 def _violation(H, h, mu, f_min, t, n):  # type: ignore[no-untyped-def]
     """How far a feasible (t, n) is from optimal: the gradient's distance from the dual cone, and the gap."""
     z_t, z_n = _gradient(H, h, t, n)
@@ -56,7 +56,7 @@ def _violation(H, h, mu, f_min, t, n):  # type: ignore[no-untyped-def]
     return max(-slack / scale, abs(gap) / (scale * size) if size > 0.0 else 0.0)
 
 
-@kernel
+@subroutine
 def planar_force(H, h, mu, f_min, f):  # type: ignore[no-untyped-def]
     """Write the minimiser (f_t, f_n) of 1/2 f'H f - h'f over {|f_t| <= mu f_n, f_n >= f_min} into f (2,).
 
@@ -95,7 +95,7 @@ def planar_force(H, h, mu, f_min, f):  # type: ignore[no-untyped-def]
         f[0] = f[1] = np.nan
 
 
-@kernel
+@subroutine
 def balancing_wrench(J, b, f, w):  # type: ignore[no-untyped-def]
     """Write w = b - J f: with the contact forces given, only one wrench balances."""
     for i in range(J.shape[0]):

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from pivoting.controller.block_matrix import Sparse
 from pivoting.controller.conic import CLARABEL, clarabel_solver
-from pivoting.controller.kernel import kernel
+from pivoting.controller.kernel import allocating, subroutine
 from pivoting.controller.validate import Array, fail
 from scipy import sparse
 
@@ -236,7 +236,7 @@ def kkt_residual(program: ConicProgram, x: Array, z: Array) -> float:
     return float(_residual(*matrices, program.q, program.b, zero, linear, sizes, x, z))
 
 
-@kernel
+@allocating
 def _residual(P, P_row, P_column, A, A_row, A_column, q, b, zero, linear, orders, x, z):  # type: ignore[no-untyped-def]
     n, m = q.shape[0], b.shape[0]
     curved, pull, s, terms = np.zeros(n), np.zeros(n), b.copy(), np.zeros(m)
@@ -261,7 +261,7 @@ def _residual(P, P_row, P_column, A, A_row, A_column, q, b, zero, linear, orders
     return max(primal, dual, stationary, gap) if np.isfinite(primal + dual + stationary + gap) else np.nan
 
 
-@kernel
+@subroutine
 def _outside(s, zero, linear, orders, dual):  # type: ignore[no-untyped-def]
     """How far s is from its cone, the greatest over its parts; `dual`: the dual cone, which leaves equalities free."""
     worst = 0.0

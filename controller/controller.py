@@ -16,7 +16,7 @@ from pivoting.controller.dispatch import smallest_wrench, workspace
 from pivoting.controller.kernel import inlined, kernel
 from pivoting.controller.laws import Body, Law, fill_required
 from pivoting.controller.problem import WrenchProblem, wrench_weight
-from pivoting.controller.space import IDENTITY, Motion, Space, fill_rotation, rotation_matrix, space
+from pivoting.controller.space import IDENTITY, Motion, Space, cross, fill_rotation, rotation_matrix, space
 from pivoting.controller.units import Units, lever, units
 from pivoting.controller.validate import Array, array, fail, number, positive_definite
 
@@ -141,15 +141,17 @@ class WrenchController:
         belief = self.belief
         return units(belief.mass, belief.gravity, belief.points, self.space.dim)
 
-    def workspace(self) -> tuple[Array, Array | None]:
+    def workspace(self) -> tuple[Array | None, ...]:
         """Scratch of the compiled loop, one for each thread."""
-        return workspace(len(self.Q_w), len(self.contacts), self.space.dim)
+        nw, n = len(self.Q_w), len(self.Q_f)
+        own = np.empty((3, 3)), np.empty((nw, n)), np.empty((nw, nw)), np.empty(6)
+        return (*own, *workspace(nw, len(self.contacts), self.space.dim))
 
     def jacobian(self, orientation: Array) -> Array:
         """(nw, K d) contact Jacobian in object axes at an orientation (4,), object axes to world."""
         R, J, still = np.empty((3, 3)), np.empty((len(self.Q_w), len(self.Q_f))), np.zeros(3)
         q = np.array(orientation)
-        _fill_problem(self.belief, q, still, q, still, still, R, J, np.empty(len(self.Q_w)))
+        state_problem(self.belief, q, still, q, still, still, R, J, np.empty(len(self.Q_w)))
         return J
 
     def problem(
@@ -168,7 +170,7 @@ class WrenchController:
         target = Motion(state.orientation) if desired is None else desired
         q_d, omega_d, alpha_d = self.space.lift_motion(target)
         R, J, required = np.empty((3, 3)), np.empty((len(self.Q_w), len(self.Q_f))), np.empty(len(self.Q_w))
-        _fill_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, required)
+        state_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, required)
         if external is not None:
             required -= array("external", external, required.shape)
         return WrenchProblem(
@@ -203,6 +205,9 @@ def _fill_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ig
     )  # fmt: skip
 
 
+state_problem = kernel(_fill_problem)  # called from Python
+
+
 @kernel
 def step_worlds(  # type: ignore[no-untyped-def]
     belief, bounds, work, tolerance, q, omega, q_d, omega_d, alpha_d, external, required, wrench, force, residual,
@@ -225,18 +230,20 @@ def step_worlds(  # type: ignore[no-untyped-def]
         force: (W, K d) out, in contact axes.
         residual: (W,) out.  status: (W,) out, int8: 0 solved, 1 inaccurate, 2 failed.
     """
-    nw, n = belief.wrench_map.shape[0], belief.points.shape[0] * belief.force_map.shape[1]
-    R, J = np.empty((3, 3)), np.empty((nw, n))
-    Q, root = np.empty((nw, nw)), np.empty(6)
+    nw = belief.wrench_map.shape[0]
+    R, J, Q, root, reduced, pull, scratch = work
     Q_w, Q_f, mu, f_min = belief.Q_w, belief.Q_f, belief.mu, belief.f_min  # taken out once: it shows in the plane
     for i in range(q.shape[0]):
         j, b = i % q_d.shape[0], required[i]
         _fill_problem(belief, q[i], omega[i], q_d[j], omega_d[j], alpha_d[j], R, J, b)
         for row in range(nw):
             b[row] -= external[i % external.shape[0], row]
-        Q[:], ball = Q_w, -1
+        ball = -1
+        for row in range(nw):
+            for column in range(nw):
+                Q[row, column] = Q_w[row, column]
         for attempt in range(ATTEMPTS + 1):
-            residual[i] = smallest_wrench(J, b, Q, Q_f, mu, f_min, force[i], wrench[i], work[0], work[1])
+            residual[i] = smallest_wrench(J, b, Q, Q_f, mu, f_min, force[i], wrench[i], reduced, pull, scratch)
             if attempt == 0:
                 ball = farthest_exceeded(bounds, wrench[i])
                 if ball >= 0:
@@ -251,10 +258,14 @@ def step_worlds(  # type: ignore[no-untyped-def]
             if attempt < ATTEMPTS - 1 and root[0] <= HEAVIEST * root[5]:
                 fill_heavier(bounds, ball, root[0], Q_w, Q)
             else:  # out of reach: as without bounds
-                Q[:], ball = Q_w, -1
+                ball = -1
+                for row in range(nw):
+                    for column in range(nw):
+                        Q[row, column] = Q_w[row, column]
         if not np.isfinite(residual[i]):
             status[i] = FAILED
-            wrench[i, :] = np.nan
+            for row in range(nw):
+                wrench[i, row] = np.nan
         else:
             status[i] = SOLVED if residual[i] <= tolerance else INACCURATE
 
@@ -267,13 +278,17 @@ def world_wrench(wrench_map, q, wrench, out):  # type: ignore[no-untyped-def]
         wrench_map: (nw, 6), see `Space`.  q: (W, 4) object to world.  wrench: (W, nw).
         out: (W, 6), written; zero where the wrench is not finite: without an answer nothing is applied.
     """
-    R = np.empty((3, 3))
     for i in range(q.shape[0]):
-        fill_rotation(q[i], R)
+        w, x, y, z = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
+        s = 2.0 / (w * w + x * x + y * y + z * z)
         for half in (0, 3):
-            for row in range(3):
-                s = 0.0
-                for p in range(3):
-                    for j in range(wrench.shape[1]):
-                        s += R[row, p] * wrench_map[j, half + p] * wrench[i, j]
-                out[i, half + row] = s if np.isfinite(s) else 0.0
+            a = b = c = 0.0
+            for j in range(wrench.shape[1]):
+                a += wrench_map[j, half] * wrench[i, j]
+                b += wrench_map[j, half + 1] * wrench[i, j]
+                c += wrench_map[j, half + 2] * wrench[i, j]
+            t, u, v = cross(x, y, z, a, b, c)
+            d, e, f = cross(x, y, z, t, u, v)
+            a, b, c = a + s * (w * t + d), b + s * (w * u + e), c + s * (w * v + f)
+            finite = np.isfinite(a + b + c)
+            out[i, half], out[i, half + 1], out[i, half + 2] = (a, b, c) if finite else (0.0, 0.0, 0.0)

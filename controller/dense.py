@@ -1,12 +1,12 @@
 """Small dense symmetric systems, in place and without allocation: the inner loop of the contact kernels."""
 
 import numpy as np
-from pivoting.controller.kernel import kernel
+from pivoting.controller.kernel import subroutine
 
 TINY = 1e-14  # least pivot, relative to its diagonal entry: a matrix that rounding made indefinite stays usable
 
 
-@kernel
+@subroutine
 def factor(M, n):  # type: ignore[no-untyped-def]
     """Overwrite the upper triangle of the leading (n, n) block of M with U of M = U'U (row operations: they vectorise).
 
@@ -26,7 +26,7 @@ def factor(M, n):  # type: ignore[no-untyped-def]
                 M[i, i] = TINY * before
 
 
-@kernel
+@subroutine
 def solve_factored(U, x, n):  # type: ignore[no-untyped-def]
     """Overwrite x (n,) with the solution of U'U x = x, U from `factor`."""
     for k in range(n):

@@ -3,7 +3,7 @@
 from typing import NamedTuple, Self
 
 import numpy as np
-from pivoting.controller.kernel import kernel
+from pivoting.controller.kernel import allocating, kernel
 from pivoting.controller.so3 import fill_difference_jacobians, turn
 from pivoting.controller.space import cross, fill_rotation, into, rotation_error
 from pivoting.controller.transcription import Motion, fill_motion
@@ -29,7 +29,7 @@ class Rows(NamedTuple):
         return cls(motion, np.empty((N, S, nq)), np.empty((N, S)), np.empty((N, P, nq)), np.empty((N, P)))
 
 
-@kernel
+@allocating
 def fill_rows(body, order, lag, h, fixed, planar, clear, path, wrench, force, rows):  # type: ignore[no-untyped-def]
     """Write all of them about a path, wrenches (N, nw) and forces (N, K d) [N, N m]; those without a row are left."""
     fill_motion(body, order, lag, h, path, wrench, force, rows.motion)
@@ -78,7 +78,7 @@ def defects(rows, units, wrench, force):  # type: ignore[no-untyped-def]
     return moved, off
 
 
-@kernel
+@allocating
 def fill_corrected(body, x, guess, out):  # type: ignore[no-untyped-def]
     """Write the guess that an answer x (N, 2 nq + K d) makes of a guess, and return the greatest change, in units."""
     nq, n, units, change = guess.wrench.shape[1], guess.force.shape[1], body.units, 0.0
@@ -99,7 +99,7 @@ def fill_corrected(body, x, guess, out):  # type: ignore[no-untyped-def]
     return change
 
 
-@kernel
+@allocating
 def fill_sticking(body, fixed, planar, path, rows, side):  # type: ignore[no-untyped-def]
     """Write rows (N, S, nq) and sides (N, S): rows d_t = side keeps the contacts where they were at the start.
 
@@ -143,7 +143,7 @@ def fill_sticking(body, fixed, planar, path, rows, side):  # type: ignore[no-unt
             row += 1
 
 
-@kernel
+@allocating
 def fill_clearance(body, clear, path, rows, side):  # type: ignore[no-untyped-def]
     """Write rows (N, P, nq) and sides (N, P): rows d_t <= side keeps points above the lowest contact of the start.
 
@@ -171,7 +171,7 @@ def fill_clearance(body, clear, path, rows, side):  # type: ignore[no-untyped-de
             side[t, k] = height / length
 
 
-@kernel
+@allocating
 def fill_tracking(body, Q, path, position, orientation, curvature, slope):  # type: ignore[no-untyped-def]
     """Write what 1/2 e'Q e is to second order in d_t, e the errors from a path's poses to desired ones.
 

@@ -11,7 +11,7 @@ import numpy as np
 from pivoting.controller.certificate import kkt_residual
 from pivoting.controller.closed_form import balancing_wrench
 from pivoting.controller.dense import factor, solve_factored
-from pivoting.controller.kernel import kernel
+from pivoting.controller.kernel import subroutine
 from pivoting.controller.polish import gradient, polish, release
 from pivoting.controller.spatial_form import APEX, EDGE, FLOOR, INSIDE, RIM
 
@@ -37,7 +37,7 @@ class Work(NamedTuple):
     g: np.ndarray  # (n,): H f - h at the iterate
     trial_f: np.ndarray  # (n,) and (nw,): an answer that may be better
     trial_w: np.ndarray
-    pull: np.ndarray  # (nw,): Q_w w
+    pull: np.ndarray  # (2, nw): Q_w w, and |Q_w||w|
     tangent: np.ndarray  # (n, d)
     start: np.ndarray  # (K + 1,) int
     piece: np.ndarray  # (K,) int
@@ -53,46 +53,69 @@ class Work(NamedTuple):
 def scratch_size(nw: int, K: int, dim: int) -> int:
     """Length of the scratch of `views`: K contacts of `dim` forces, wrenches of nw components."""
     n = K * dim
-    return 2 * n * n + n * dim + 7 * n + 2 * nw + 27 * K + 1
+    return 2 * n * n + n * dim + 7 * n + nw + 27 * K + 1
 
 
-@kernel
-def views(scratch, nw, K, dim):  # type: ignore[no-untyped-def]
+@subroutine
+def reduced_views(scratch, n):  # type: ignore[no-untyped-def]
+    """H (n, n), h (n,) and scratch (n,) for `reduce`: the first parts of a scratch."""
+    end = n * n
+    return scratch[:end].reshape(n, n), scratch[end : end + n], scratch[end + n : end + 2 * n]
+
+
+@subroutine
+def views(scratch, pull, K, dim):  # type: ignore[no-untyped-def]
     """The parts of a scratch, which is handed around whole: passing 21 arrays would cost more than a planar solve."""
     n = K * dim
-    squares, end = scratch[: 2 * n * n].reshape(2, n, n), 2 * n * n
-    rows, end = scratch[end : end + 7 * n].reshape(7, n), end + 7 * n
+    H, h, x = reduced_views(scratch, n)
+    end = n * n + 2 * n
+    M, end = scratch[end : end + n * n].reshape(n, n), end + n * n
+    rows, end = scratch[end : end + 5 * n].reshape(5, n), end + 5 * n
     tangent, end = scratch[end : end + n * dim].reshape(n, dim), end + n * dim
-    wrenches, end = scratch[end : end + 2 * nw].reshape(2, nw), end + 2 * nw
+    nw = pull.shape[1]
+    trial_w, end = scratch[end : end + nw], end + nw
     triples, end = scratch[end : end + 12 * K].reshape(4, K, 3), end + 12 * K
     fours, end = scratch[end : end + 8 * K].reshape(2, K, 4), end + 8 * K
     floor, end = scratch[end : end + 5 * K].reshape(K, 5), end + 5 * K
     counts = scratch[end : end + 2 * K + 1].view(np.int64)
     return Work(
-        squares[0], rows[0], squares[1], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], wrenches[0], wrenches[1],
-        tangent, counts[: K + 1], counts[K + 1 :], triples[0], triples[1], fours[0], fours[1], triples[2], triples[3],
-        floor,
+        H, h, M, x, rows[0], rows[1], rows[2], rows[3], rows[4], trial_w, pull, tangent, counts[: K + 1], counts[K + 1 :],
+        triples[0], triples[1], fours[0], fours[1], triples[2], triples[3], floor,
     )  # fmt: skip
 
 
-@kernel
-def contact_forces(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-untyped-def]
+@subroutine
+def contact_forces(J, b, Q_w, Q_f, mu, f_min, guessed, f, w, work):  # type: ignore[no-untyped-def]
     """Write the optimum into f (n,) and w (nw,), given finite H and h in `work`; return its relative KKT residual."""
-    n = f.shape[0]
-    dim = n // mu.shape[0]
+    n, K = f.shape[0], mu.shape[0]
+    dim = n // K
     H, h, M, x, g, now = work.H, work.h, work.M, work.x, work.g, work.now
-    if _nothing_pulls(h, mu, f_min, dim):  # f = 0 is optimal, exactly
-        f[:] = 0.0
-        balancing_wrench(J, b, f, w)
-        return kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f)
     best = np.inf
-    M[:] = H
-    now[:] = h
+    if not _finite(H, h, mu, f_min):
+        for i in range(n):
+            f[i] = np.nan
+        balancing_wrench(J, b, f, w)
+        return np.nan
+    if guessed:
+        for i in range(n):
+            now[i] = f[i]
+        best = _try(J, b, Q_w, Q_f, mu, f_min, dim, 1, f, w, best, work)
+        if best <= EXACT:
+            return best
+    if _nothing_pulls(h, mu, f_min, dim):  # f = 0 is optimal, exactly
+        for i in range(n):
+            now[i] = 0.0
+        return _try(J, b, Q_w, Q_f, mu, f_min, dim, 0, f, w, best, work)
+    for i in range(n):
+        now[i] = h[i]
+        for j in range(n):
+            M[i, j] = H[i, j]
     factor(M, n)
     solve_factored(M, now, n)
     if _inside(mu, f_min, dim, now):
-        work.piece[:] = INSIDE
-        best = _try(J, b, Q_w, Q_f, mu, f_min, dim, True, f, w, best, work)
+        for i in range(K):
+            work.piece[i] = INSIDE
+        best = _try(J, b, Q_w, Q_f, mu, f_min, dim, GUESSES, f, w, best, work)
         if best <= EXACT:
             return best
     cones = _start(H, h, mu, f_min, dim, work)
@@ -103,11 +126,13 @@ def contact_forces(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-un
             break
         if gap + left <= goal * size:
             _guess(mu, f_min, work)
-            best = _try(J, b, Q_w, Q_f, mu, f_min, dim, True, f, w, best, work)
+            best = _try(J, b, Q_w, Q_f, mu, f_min, dim, GUESSES, f, w, best, work)
             if best <= EXACT or goal < 1e-13:
                 break
             goal *= 1e-2
-        M[:] = H
+        for i in range(n):
+            for j in range(i, n):
+                M[i, j] = H[i, j]
         _scale(mu, f_min, dim, work)
         factor(M, n)
         for i in range(n):
@@ -128,25 +153,28 @@ def contact_forces(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-un
             break
         _advance(f_min, min(1.0, alpha), work)
     if best > EXACT:
-        best = _try(J, b, Q_w, Q_f, mu, f_min, dim, False, f, w, best, work)
+        best = _try(J, b, Q_w, Q_f, mu, f_min, dim, 0, f, w, best, work)
     return best
 
 
-@kernel
-def _try(J, b, Q_w, Q_f, mu, f_min, dim, polished, f, w, best, work):  # type: ignore[no-untyped-def]
-    """Polish the iterate, or take it as it is; keep it in f and w if its certificate is the better one."""
+@subroutine
+def _try(J, b, Q_w, Q_f, mu, f_min, dim, polishes, f, w, best, work):  # type: ignore[no-untyped-def]
+    """Polish the iterate, or with no polishes take it as it is; keep it in f and w if its certificate is better."""
     trial_f, trial_w = work.trial_f, work.trial_w
-    for _ in range(GUESSES if polished else 1):
-        trial_f[:] = work.now
+    for _ in range(max(polishes, 1)):
+        for i in range(f.shape[0]):
+            trial_f[i] = work.now[i]
         balancing_wrench(J, b, trial_f, trial_w)
-        if polished:
+        if polishes > 0:
             polish(J, Q_w, Q_f, work.H, mu, f_min, dim, work.piece, trial_f, trial_w, work)
-        residual = kkt_residual(J, b, Q_w, Q_f, mu, f_min, trial_w, trial_f)
+        residual = kkt_residual(J, b, Q_w, Q_f, mu, f_min, trial_w, trial_f, work.pull)
         if residual < best:
             best = residual
-            f[:] = trial_f
-            w[:] = trial_w
-        if best <= EXACT or not polished:
+            for i in range(f.shape[0]):
+                f[i] = trial_f[i]
+            for i in range(w.shape[0]):
+                w[i] = trial_w[i]
+        if best <= EXACT or polishes == 0:
             return best
         gradient(J, Q_w, Q_f, trial_w, trial_f, work.pull, work.z)
         if not release(mu, dim, work.piece, trial_f, work.z):
@@ -154,7 +182,20 @@ def _try(J, b, Q_w, Q_f, mu, f_min, dim, polished, f, w, best, work):  # type: i
     return best
 
 
-@kernel
+@subroutine
+def _finite(H, h, mu, f_min):  # type: ignore[no-untyped-def]
+    """Is the problem finite?"""
+    total = 0.0
+    for i in range(h.shape[0]):
+        total += h[i]
+        for j in range(h.shape[0]):
+            total += H[i, j]
+    for i in range(mu.shape[0]):
+        total += mu[i] + f_min[i]
+    return np.isfinite(total)
+
+
+@subroutine
 def _nothing_pulls(h, mu, f_min, dim):  # type: ignore[no-untyped-def]
     """Is -h in every dual cone, and no floor above 0: then f = 0 is the optimum."""
     for i in range(mu.shape[0]):
@@ -165,7 +206,7 @@ def _nothing_pulls(h, mu, f_min, dim):  # type: ignore[no-untyped-def]
     return True
 
 
-@kernel
+@subroutine
 def _inside(mu, f_min, dim, f):  # type: ignore[no-untyped-def]
     """Is every force (n,) in its truncated cone?"""
     for i in range(mu.shape[0]):
@@ -176,7 +217,7 @@ def _inside(mu, f_min, dim, f):  # type: ignore[no-untyped-def]
     return True
 
 
-@kernel
+@subroutine
 def _start(H, h, mu, f_min, dim, work):  # type: ignore[no-untyped-def]
     """From the free minimum in `now` to a strictly feasible start with multipliers on the central path's scale.
 
@@ -196,9 +237,11 @@ def _start(H, h, mu, f_min, dim, work):  # type: ignore[no-untyped-def]
         shrink = min(1.0, 0.5 * mu[i] * now[normal] / size) if size > 0.0 else 1.0
         for p in range(i * dim, normal):
             now[p] *= shrink
-    y[:] = 0.0
-    s[:] = 0.0
-    floor[:] = 0.0
+    for i in range(K):
+        for a in range(3):
+            y[i, a] = s[i, a] = 0.0
+        for a in range(5):
+            floor[i, a] = 0.0
     _measure(mu, f_min, dim, work)
     cones = 0
     level = 0.0
@@ -215,7 +258,7 @@ def _start(H, h, mu, f_min, dim, work):  # type: ignore[no-untyped-def]
     return cones
 
 
-@kernel
+@subroutine
 def _measure(mu, f_min, dim, work):  # type: ignore[no-untyped-def]
     """Slacks and gradient of the iterate; its gap, what is left of the dual residual, and the size of both."""
     H, h, now, g, s, y, floor = work.H, work.h, work.now, work.g, work.s, work.y, work.floor
@@ -244,7 +287,7 @@ def _measure(mu, f_min, dim, work):  # type: ignore[no-untyped-def]
     return gap, left, size
 
 
-@kernel
+@subroutine
 def _guess(mu, f_min, work):  # type: ignore[no-untyped-def]
     """The piece each contact is on: of slack and multiplier, the one that is not small."""
     s, y, floor = work.s, work.y, work.floor
@@ -263,14 +306,14 @@ def _guess(mu, f_min, work):  # type: ignore[no-untyped-def]
             work.piece[i] = RIM if low else EDGE
 
 
-@kernel
+@subroutine
 def _determinant(v0, v1, v2):  # type: ignore[no-untyped-def]
     """v_0^2 - |v_1|^2 without the cancellation of the squares."""
     size = np.sqrt(v1 * v1 + v2 * v2)
     return (v0 - size) * (v0 + size)
 
 
-@kernel
+@subroutine
 def _unscale(b0, b1, b2, eta, v0, v1, v2):  # type: ignore[no-untyped-def]
     """W^-1 v for the scaling point b."""
     dot = b1 * v1 + b2 * v2
@@ -279,7 +322,7 @@ def _unscale(b0, b1, b2, eta, v0, v1, v2):  # type: ignore[no-untyped-def]
     return (b0 * v0 - dot) * inverse, (v1 + slope * b1) * inverse, (v2 + slope * b2) * inverse
 
 
-@kernel
+@subroutine
 def _scale(mu, f_min, dim, work):  # type: ignore[no-untyped-def]
     """The Nesterov-Todd scaling W y = W^-1 s = lam of every cone, and M += A'W^-2 A block by block.
 
@@ -312,7 +355,7 @@ def _scale(mu, f_min, dim, work):  # type: ignore[no-untyped-def]
             M[e, e] += floor[i, Q] / floor[i, P]
 
 
-@kernel
+@subroutine
 def _step_length(mu, f_min, dim, corrected, work):  # type: ignore[no-untyped-def]
     """The steps that belong to the step x of f, and how far (<= 2) they may be followed to the first boundary.
 
@@ -349,7 +392,7 @@ def _step_length(mu, f_min, dim, corrected, work):  # type: ignore[no-untyped-de
     return alpha
 
 
-@kernel
+@subroutine
 def _reach(v0, v1, v2, d0, d1, d2):  # type: ignore[no-untyped-def]
     """The largest t <= 2 with v + t d in the second-order cone, v inside: the first root of a quadratic."""
     inside = _determinant(v0, v1, v2)
@@ -361,7 +404,7 @@ def _reach(v0, v1, v2, d0, d1, d2):  # type: ignore[no-untyped-def]
     return inside / slope if slope > 0.5 * inside else 2.0
 
 
-@kernel
+@subroutine
 def _correct(mu, f_min, dim, target, second, work):  # type: ignore[no-untyped-def]
     r"""From the predictor's steps: c = lam \ (target e - second (W^-1 ds) o (W dy)), and x = -g + A'W^-1 c."""
     x, g, u, lam, c, bar, floor = work.x, work.g, work.u, work.lam, work.c, work.bar, work.floor
@@ -385,7 +428,7 @@ def _correct(mu, f_min, dim, target, second, work):  # type: ignore[no-untyped-d
             x[e] += floor[i, C]
 
 
-@kernel
+@subroutine
 def _advance(f_min, alpha, work):  # type: ignore[no-untyped-def]
     """Follow the step: f, and the multipliers; the slacks are functions of f."""
     for i in range(work.x.shape[0]):

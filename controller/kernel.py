@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from numba import guvectorize, njit
+from numba.extending import register_jitable
 
 
 def _cache_folder() -> Path | None:
@@ -23,10 +24,16 @@ def _cache_folder() -> Path | None:
 CACHE = _cache_folder()
 CACHED = CACHE is not None
 
-kernel = njit(cache=CACHED, error_model="numpy", forceinline=False)
-inlined = njit(cache=CACHED, error_model="numpy", forceinline=True)  # a call with ten arrays costs 0.1 us
+_ours: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+_inside = {**_ours, "_nrt": False, "no_cpython_wrapper": True}
+
+kernel = njit(cache=CACHED, forceinline=False, _nrt=False, **_ours)
+allocating = njit(cache=CACHED, forceinline=False, **_ours)
+subroutine = register_jitable(forceinline=False, **_inside)
+inlined = register_jitable(forceinline=True, **_inside)
 
 
 def elementwise(layout: str) -> Callable[..., Any]:
     """A decorator: two float arrays and an output, broadcast over all axes but those that `layout` names."""
     return guvectorize(["void(f8[:], f8[:], f8[:])"], layout, cache=CACHED)
+

@@ -7,21 +7,21 @@ there are no arcs. Newton then converges quadratically to a point whose certific
 
 import numpy as np
 from pivoting.controller.dense import factor, solve_factored
-from pivoting.controller.kernel import kernel
+from pivoting.controller.kernel import subroutine
 from pivoting.controller.spatial_form import APEX, EDGE, FLOOR, INSIDE, RIM
 
 STEPS = 12  # bound of the Newton steps; 2 or 3 suffice once the pieces are right
 
 
-@kernel
+@subroutine
 def gradient(J, Q_w, Q_f, w, f, pull, z):  # type: ignore[no-untyped-def]
-    """Write Q_w w into pull (nw,) and Q_f f - J'Q_w w, the gradient of the objective along f, into z (n,)."""
+    """Write Q_w w into pull[0] (nw,) and Q_f f - J'Q_w w, the gradient of the objective along f, into z (n,)."""
     nw, n = J.shape
     for i in range(nw):
         value = 0.0
         for j in range(nw):
             value += Q_w[i, j] * w[j]
-        pull[i] = value
+        pull[0, i] = value
     for j in range(n):
         z[j] = 0.0
     for i in range(n):  # rows on the outside: contiguous, so that it vectorises; Q_f is symmetric
@@ -29,12 +29,12 @@ def gradient(J, Q_w, Q_f, w, f, pull, z):  # type: ignore[no-untyped-def]
         for j in range(n):
             z[j] += Q_f[i, j] * value
     for i in range(nw):
-        value = pull[i]
+        value = pull[0, i]
         for j in range(n):
             z[j] -= J[i, j] * value
 
 
-@kernel
+@subroutine
 def polish(J, Q_w, Q_f, H, mu, f_min, dim, piece, f, w, work):  # type: ignore[no-untyped-def]
     """Improve f (n,) and w (nw,) in place, staying on the pieces `piece` (K,) int, which a blocked step may change.
 
@@ -48,9 +48,9 @@ def polish(J, Q_w, Q_f, H, mu, f_min, dim, piece, f, w, work):  # type: ignore[n
     K = mu.shape[0]
     M, x, z, tangent, start, moved = work.M, work.x, work.z, work.tangent, work.start, work.moved
     for i in range(K):
-        before = f[i * dim : (i + 1) * dim]
-        moved[i * dim : (i + 1) * dim] = before
-        _land(mu[i], f_min[i], dim, piece, i, before)
+        for p in range(i * dim, (i + 1) * dim):
+            moved[p] = f[p]
+        _land(mu[i], f_min[i], dim, piece, i, f[i * dim : (i + 1) * dim])
     _carry(J, f, moved, w)
     for _ in range(STEPS):
         gradient(J, Q_w, Q_f, w, f, work.pull, z)
@@ -98,7 +98,7 @@ def polish(J, Q_w, Q_f, H, mu, f_min, dim, piece, f, w, work):  # type: ignore[n
             return
 
 
-@kernel
+@subroutine
 def _carry(J, f, before, w):  # type: ignore[no-untyped-def]
     """w -= J (f - before)."""
     for i in range(J.shape[0]):
@@ -108,7 +108,7 @@ def _carry(J, f, before, w):  # type: ignore[no-untyped-def]
         w[i] -= value
 
 
-@kernel
+@subroutine
 def _tangents(mu, dim, piece, at, f, tangent):  # type: ignore[no-untyped-def]
     """Write d f / d coordinates of the contact at rows at, at + 1, ... of tangent (n, dim); return how many."""
     n = at + dim - 1
@@ -132,7 +132,7 @@ def _tangents(mu, dim, piece, at, f, tangent):  # type: ignore[no-untyped-def]
     return arc + 1
 
 
-@kernel
+@subroutine
 def _move(mu, f_min, dim, piece, i, first, x, tangent, f):  # type: ignore[no-untyped-def]
     """Move contact i by its step x[first:]; True where it changed its piece, being stopped by another one."""
     at, n, kind = i * dim, i * dim + dim - 1, piece[i]
@@ -152,7 +152,7 @@ def _move(mu, f_min, dim, piece, i, first, x, tangent, f):  # type: ignore[no-un
     return _land(mu, f_min, dim, piece, i, f[at : at + dim])
 
 
-@kernel
+@subroutine
 def _land(mu, f_min, dim, piece, i, force):  # type: ignore[no-untyped-def]
     """Put a force (dim,) exactly on its piece; True where that is not the piece it was on, which it left."""
     kind, n = piece[i], dim - 1
@@ -166,7 +166,8 @@ def _land(mu, f_min, dim, piece, i, force):  # type: ignore[no-untyped-def]
     elif kind in (EDGE, RIM) and size == 0.0:  # it has no direction to keep
         kind = INSIDE if kind == EDGE else FLOOR
     if kind == APEX:
-        force[:] = 0.0
+        for p in range(dim):
+            force[p] = 0.0
     elif kind in (FLOOR, RIM):
         force[n] = f_min
     if kind in (EDGE, RIM):
@@ -177,7 +178,7 @@ def _land(mu, f_min, dim, piece, i, force):  # type: ignore[no-untyped-def]
     return changed
 
 
-@kernel
+@subroutine
 def release(mu, dim, piece, f, z):  # type: ignore[no-untyped-def]
     """Leave the pieces whose multipliers (z is the gradient, (n,)) have the wrong sign; True where there was one."""
     changed = False

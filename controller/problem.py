@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.certificate import kkt_residual
+from pivoting.controller.certificate import certified_residual
 from pivoting.controller.polygon import Polygon, polygon
 from pivoting.controller.validate import Array, array, fail, number, positive_definite
 
@@ -114,7 +114,10 @@ class WrenchProblem:
         w, f = np.array(wrench, dtype=float), np.array(force, dtype=float).ravel()
         shape = self._pyramid(edges) if edges else (None, None)
         return float(
-            kkt_residual(self.jacobian, self.required, self.Q_w, self.Q_f, self.mu_planned, self.f_min, w, f, *shape)
+            certified_residual(
+                self.jacobian, self.required, self.Q_w, self.Q_f, self.mu_planned, self.f_min, w, f,
+                np.empty((2, w.size)), *shape,
+            )  # fmt: skip
         )
 
     def _pyramid(self, edges: int) -> Polygon:

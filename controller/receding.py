@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from pivoting.controller.horizon import BodyState
-from pivoting.controller.kernel import kernel
+from pivoting.controller.kernel import allocating
 from pivoting.controller.plan import Plan, Planner
 from pivoting.controller.so3 import turn
 from pivoting.controller.space import fill_rotation, into, quaternion_product
@@ -113,7 +113,7 @@ def followed_motion(followed: Followed, state: BodyState, times: Array) -> tuple
     return out
 
 
-@kernel
+@allocating
 def _follow(begun, rates, accelerated, h, times, orientation, rate, acceleration):  # type: ignore[no-untyped-def]
     """Write the motion (T, 4), (T, 3), (T, 3) from `begun` (4,), with rates (N + 1, 3) in world axes every h [s]."""
     N, R = rates.shape[0] - 1, np.empty((3, 3))

@@ -1,19 +1,19 @@
 """Small turns: what linearises rotations, compiled, and turning by rotation vectors (Sola et al. 2018)."""
 
 import numpy as np
-from pivoting.controller.kernel import elementwise, kernel
+from pivoting.controller.kernel import elementwise, kernel, subroutine
 from pivoting.controller.space import fill_product, rotation_error
 from pivoting.controller.validate import Array
 
 _SMALL = 1e-4  # [rad]: below, the series is more accurate than the quotient
 
 
-@kernel
+@subroutine
 def turn(orientation, vector, out):  # type: ignore[no-untyped-def]
     """Write the unit quaternion (4,) turned by a rotation vector (3,) [rad] in the object's own axes."""
     angle = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
     scale = 0.5 if angle < 1e-9 else np.sin(0.5 * angle) / angle
-    by = np.array([np.cos(0.5 * angle), scale * vector[0], scale * vector[1], scale * vector[2]])
+    by = np.cos(0.5 * angle), scale * vector[0], scale * vector[1], scale * vector[2]
     fill_product(orientation, by, out)
     length = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2)
     for i in range(4):
@@ -44,7 +44,7 @@ def fill_differences(orientation, out):  # type: ignore[no-untyped-def]
         out[i, 0], out[i, 1], out[i, 2] = rotation_error(orientation[i], orientation[i + 1])
 
 
-@kernel
+@subroutine
 def fill_hat(x, y, z, out):  # type: ignore[no-untyped-def]
     """Write the matrix (3, 3) with out u = (x, y, z) x u."""
     out[0, 0] = out[1, 1] = out[2, 2] = 0.0
@@ -52,7 +52,7 @@ def fill_hat(x, y, z, out):  # type: ignore[no-untyped-def]
     out[1, 0], out[2, 0], out[2, 1] = z, -y, x
 
 
-@kernel
+@subroutine
 def add_product(scale, A, B, out):  # type: ignore[no-untyped-def]
     """out += scale A B, all (3, 3)."""
     for i in range(3):
@@ -60,7 +60,7 @@ def add_product(scale, A, B, out):  # type: ignore[no-untyped-def]
             out[i, j] += scale * (A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j])
 
 
-@kernel
+@subroutine
 def fill_difference_jacobians(v, end, start):  # type: ignore[no-untyped-def]
     """Derivatives (3, 3) of v = rotation_error(q, q_d) by small turns of q_d (`end`) and of q (`start`), object axes.
 

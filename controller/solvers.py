@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from pivoting.controller.conic import CLARABEL, Answer, clarabel_answer, scaled, split
-from pivoting.controller.dispatch import smallest_wrench, workspace
+from pivoting.controller.dispatch import solve_one, workspace
 from pivoting.controller.problem import WrenchProblem
 from pivoting.controller.solution import INSCRIBED, STATUS, TOLERANCE, Solution, SolveError, certified
 from pivoting.controller.validate import fail, number
@@ -158,7 +158,7 @@ def _compiled(problem: WrenchProblem, options: Options, edges: int) -> Answer:
     # copies that may be written, as in the loop: of read-only arrays numba would compile everything again
     stated = [np.array(values) for values in (problem.jacobian, problem.required, problem.Q_w, problem.Q_f)]
     cones = np.array(problem.mu_planned), np.array(problem.f_min)
-    smallest_wrench(*stated, *cones, f, w, *workspace(nw, problem.contacts, problem.dim))
+    solve_one(*stated, *cones, f, w, *workspace(nw, problem.contacts, problem.dim))
     return w, f, "compiled kernel"
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.kernel import elementwise, inlined, kernel
+from pivoting.controller.kernel import elementwise, inlined, kernel, subroutine
 from pivoting.controller.validate import Array, array, fail, unit_quaternions
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
@@ -143,20 +143,20 @@ def fill_rotation(q, out):  # type: ignore[no-untyped-def]
     out[2, 2] = 1.0 - s * (x * x + y * y)
 
 
-@kernel
+@subroutine
 def cross(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
     """a x b, as three scalars: no arrays in the inner loops."""
     return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
 
 
-@kernel
+@subroutine
 def component(wrench_map, row, F0, F1, F2, M0, M1, M2):  # type: ignore[no-untyped-def]
     """One of the nw components that are used of a wrench (F, M) in 3-D."""
     m = wrench_map[row]
     return m[0] * F0 + m[1] * F1 + m[2] * F2 + m[3] * M0 + m[4] * M1 + m[5] * M2
 
 
-@kernel
+@subroutine
 def into(R, a0, a1, a2):  # type: ignore[no-untyped-def]
     """R^T a: a world vector in object axes, as three scalars."""
     return (
@@ -181,8 +181,11 @@ def rotation_error(q, q_d):  # type: ignore[no-untyped-def]
     return scale * x, scale * y, scale * z
 
 
+_rotation = kernel(fill_rotation)  # called from Python
+
+
 def rotation_matrix(quaternion: Array) -> Array:
     """(3, 3) rotation matrix of one quaternion (4,)."""
     out = np.empty((3, 3))
-    fill_rotation(np.ascontiguousarray(quaternion, dtype=float), out)
+    _rotation(np.ascontiguousarray(quaternion, dtype=float), out)
     return out

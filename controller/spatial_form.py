@@ -7,13 +7,13 @@ these, but in lambda they have a pole and a hard case at h_3 = 0, and in t neith
 """
 
 import numpy as np
-from pivoting.controller.kernel import kernel
+from pivoting.controller.kernel import subroutine
 
 INSIDE, EDGE, FLOOR, RIM, APEX = 0, 1, 2, 3, 4  # the pieces of a truncated cone
 SWEEPS, ROOTS = 12, 40  # bounds of the two iterations, which need about 4 each
 
 
-@kernel
+@subroutine
 def spatial_force(H, h, mu, f_min, f):  # type: ignore[no-untyped-def]
     """Write the minimiser (f_t, f_o, f_n) into f (3,) and return its piece.
 
@@ -34,7 +34,7 @@ def spatial_force(H, h, mu, f_min, f):  # type: ignore[no-untyped-def]
     piece = INSIDE
     if np.hypot(f[0], f[1]) > mu * f[2]:
         if -h2 >= mu * np.hypot(h0, h1):
-            f[:] = 0.0
+            f[0] = f[1] = f[2] = 0.0
             piece = APEX
         else:
             # Rows of L^-1, for C = L^-1 D L^-T.
@@ -55,10 +55,10 @@ def spatial_force(H, h, mu, f_min, f):  # type: ignore[no-untyped-def]
     if f[2] >= f_min:
         return piece
     if not np.isfinite(f[0] + f[1] + f[2]):
-        f[:] = np.nan
+        f[0] = f[1] = f[2] = np.nan
         return piece
     if f_min == 0.0:  # an apex up to rounding
-        f[:] = 0.0
+        f[0] = f[1] = f[2] = 0.0
         return APEX
     # The optimum of the whole cone is below the floor, so by convexity the optimum lies on the floor.
     f[2] = f_min
@@ -67,7 +67,7 @@ def spatial_force(H, h, mu, f_min, f):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@kernel
+@subroutine
 def _edge(c00, c01, c02, c11, c12, c22, g0, g1, g2, y):  # type: ignore[no-untyped-def]
     """Write into y (3,) the point of the cone {y'C y <= 0, upper half} that is nearest to g, a point outside."""
     v00 = v11 = v22 = 1.0
@@ -113,7 +113,7 @@ def _edge(c00, c01, c02, c11, c12, c22, g0, g1, g2, y):  # type: ignore[no-untyp
     y[2] = v20 * q0 + v21 * q1 + v22 * t
 
 
-@kernel
+@subroutine
 def _rotation(a, b, d):  # type: ignore[no-untyped-def]
     """(cos, sin) of the Jacobi rotation that diagonalises [[a, b], [b, d]]."""
     if b == 0.0:
@@ -126,7 +126,7 @@ def _rotation(a, b, d):  # type: ignore[no-untyped-def]
     return c, t * c
 
 
-@kernel
+@subroutine
 def _nearest(a0, k0, a1, k1, p):  # type: ignore[no-untyped-def]
     """t > max(p, 0) with (a0 / x0)^2 + (a1 / x1)^2 = 1, x_i = t + k_i (t - p).
 
@@ -146,7 +146,7 @@ def _nearest(a0, k0, a1, k1, p):  # type: ignore[no-untyped-def]
     return t
 
 
-@kernel
+@subroutine
 def _disc(a, b, d, g0, g1, radius, f):  # type: ignore[no-untyped-def]
     """Write the minimiser of 1/2 p'[[a, b], [b, d]] p - g'p over |p| <= radius into f[:2]; return FLOOR or RIM."""
     det = a * d - b * b

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 from pivoting.controller.block_matrix import Indices
-from pivoting.controller.kernel import kernel
+from pivoting.controller.kernel import allocating
 from pivoting.controller.so3 import add_product, fill_difference_jacobians, fill_hat, turn
 from pivoting.controller.space import cross, fill_product, fill_rotation, into, rotation_error
 from pivoting.controller.units import Units
@@ -70,7 +70,7 @@ class Motion(NamedTuple):
     by_force: Array
 
 
-@kernel
+@allocating
 def fill_start(table, to_table, kept, h, ahead, position, orientation, velocity, omega, out):  # type: ignore[no-untyped-def]
     """Write pose 0 of a `Path`, from a state in world axes; `ahead`: one step after it, see `INTEGRATORS`.
 
@@ -92,7 +92,7 @@ def fill_start(table, to_table, kept, h, ahead, position, orientation, velocity,
         turn(before[3:], arriving[3:], out.orientation[0])
 
 
-@kernel
+@allocating
 def fill_motion(body, order, lag, h, path, wrench, force, out):  # type: ignore[no-untyped-def]
     """Write the equations of motion, to first order in poses and exactly in wrench and force, about a path.
 

@@ -137,28 +137,28 @@ def _pieces(many: Data, force: np.ndarray) -> np.ndarray:
 
 
 @njit
-def _loop(J, b, Q_w, Q_f, mu, f_min, f, w, residual, reduced, scratch):  # type: ignore[no-untyped-def]
+def _loop(J, b, Q_w, Q_f, mu, f_min, f, w, residual, reduced, pull, scratch):  # type: ignore[no-untyped-def]
     for i in range(J.shape[0]):
-        residual[i] = smallest_wrench(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], f[i], w[i], reduced, scratch)
+        residual[i] = smallest_wrench(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], f[i], w[i], reduced, pull, scratch)
 
 
 def closed_form_residuals(many: Data) -> np.ndarray:
     """(N,) residuals of one contact in space by closed form and polish alone."""
     out = np.empty(len(many.required))
-    _closed_form(*many, out, workspace(6, 1, 3)[1])
+    _closed_form(*many, out, *workspace(6, 1, 3)[1:])
     return out
 
 
 @njit
-def _closed_form(J, b, Q_w, Q_f, mu, f_min, residual, scratch):  # type: ignore[no-untyped-def]
-    work = views(scratch, 6, 1, 3)
+def _closed_form(J, b, Q_w, Q_f, mu, f_min, residual, pull, scratch):  # type: ignore[no-untyped-def]
+    work = views(scratch, pull, 1, 3)
     f, w = np.empty(3), np.empty(6)
     for i in range(J.shape[0]):
         reduce(J[i], b[i], Q_w[i], Q_f[i], work.H, work.h, work.x)
         work.piece[0] = spatial_force(work.H, work.h, mu[i, 0], f_min[i, 0], f)
         balancing_wrench(J[i], b[i], f, w)
         polish(J[i], Q_w[i], Q_f[i], work.H, mu[i], f_min[i], 3, work.piece, f, w, work)
-        residual[i] = kkt_residual(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], w, f)
+        residual[i] = kkt_residual(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], w, f, pull)
 
 
 def whitened_objective(problem: WrenchProblem) -> float:
