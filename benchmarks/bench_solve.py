@@ -18,8 +18,9 @@ import numpy as np
 from harness import main, peer_table, timed
 from pivoting.controller import ClarabelWorkspace, WrenchProblem, methods, pyramid_excess, solve
 from pivoting.controller.conic import CLARABEL, ConicForm, conic_form
-from pivoting.controller.dispatch import solve_one, workspace
+from pivoting.controller.dispatch import solve_one
 from pivoting.controller.validate import Array
+from pivoting.controller.workspace import workspace
 from rich import print as show
 from rich.markdown import Markdown
 from rich.progress import track

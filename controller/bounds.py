@@ -200,5 +200,6 @@ def fill_heavier(stacked, k, multiplier, Q_w, out):  # type: ignore[no-untyped-d
     for i in range(out.shape[0]):
         for j in range(out.shape[0]):
             out[i, j] = Q_w[i, j]
-            for row in range(stacked.first[k], stacked.first[k + 1]):
-                out[i, j] += multiplier * stacked.rows[row, i] * stacked.rows[row, j]
+            if k >= 0:
+                for row in range(stacked.first[k], stacked.first[k + 1]):
+                    out[i, j] += multiplier * stacked.rows[row, i] * stacked.rows[row, j]

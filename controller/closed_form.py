@@ -6,14 +6,19 @@ f = (0, f_min) is in the cone whatever b is. This is erratum 6 of the notes: eli
 """
 
 import numpy as np
+from pivoting.controller.certificate import kkt_residual
 from pivoting.controller.kernel import subroutine
+from pivoting.controller.workspace import Reduced
 
 SMALL = 1e-15  # relative optimality at which a candidate is taken without looking at the others
 
 
 @subroutine
 def reduce(J, b, Q_w, Q_f, H, h, row):  # type: ignore[no-untyped-def]
-    """Write H = Q_f + J'Q_w J (n, n) and h = J'Q_w b (n,) of the problem in f alone; row (n,) is scratch."""
+    """Write H = Q_f + J'Q_w J (n, n) and h = J'Q_w b (n,) of the problem in f alone; row (n,) is scratch.
+
+    Returns the sum of their entries, which is finite where the problem is.
+    """
     nw, n = J.shape
     for j in range(n):
         h[j] = 0.0
@@ -32,9 +37,13 @@ def reduce(J, b, Q_w, Q_f, H, h, row):  # type: ignore[no-untyped-def]
             left = J[p, i]
             for j in range(i, n):
                 H[i, j] += left * row[j]
+    total = 0.0
     for j in range(n):
+        total += h[j] + H[j, j]
         for i in range(j):
             H[j, i] = H[i, j]
+            total += H[i, j]
+    return total
 
 
 @subroutine
@@ -103,3 +112,13 @@ def balancing_wrench(J, b, f, w):  # type: ignore[no-untyped-def]
         for j in range(J.shape[1]):
             s -= J[i, j] * f[j]
         w[i] = s
+
+
+@subroutine
+def planar_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no-untyped-def]
+    """The smallest wrench with one contact in the plane; see `contact_wrench`."""
+    work = Reduced(*scratch)
+    reduce(J, b, Q_w, Q_f, work.H, work.h, work.x)
+    planar_force(work.H, work.h, mu[0], f_min[0], f)
+    balancing_wrench(J, b, f, w)
+    return kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, work.pull)

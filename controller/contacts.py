@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.kernel import inlined
+from pivoting.controller.kernel import subroutine
 from pivoting.controller.space import component, cross, into
 from pivoting.controller.validate import Array, array, fail, number
 
@@ -54,7 +54,7 @@ class Contact:
         return int(self.point.size)
 
 
-@inlined
+@subroutine
 def fill_jacobian(R, points, offsets, frames, wrench_map, force_map, J):  # type: ignore[no-untyped-def]
     """Write the contact Jacobian into J (nw, K d): contact forces, in contact axes, to the wrench in object axes.
 

@@ -6,19 +6,21 @@ The same compiled functions serve `problem` (one state, for people) and `step_wo
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.bounds import begin_multiplier, farthest_exceeded, fill_heavier, next_multiplier, size_over
+from pivoting.controller.bounds import Stacked, begin_multiplier, farthest_exceeded, fill_heavier, next_multiplier, size_over
+from pivoting.controller.closed_form import planar_wrench
 from pivoting.controller.contacts import Contact, fill_jacobian
-from pivoting.controller.dispatch import smallest_wrench, workspace
-from pivoting.controller.kernel import inlined, kernel
+from pivoting.controller.interior_point import contact_wrench
+from pivoting.controller.kernel import kernel, subroutine
 from pivoting.controller.laws import Body, Law, fill_required
 from pivoting.controller.problem import WrenchProblem, wrench_weight
 from pivoting.controller.space import IDENTITY, Motion, Space, cross, fill_rotation, rotation_matrix, space
 from pivoting.controller.units import Units, lever, units
 from pivoting.controller.validate import Array, array, fail, number, positive_definite
+from pivoting.controller.workspace import workspace
 
 SOLVED, INACCURATE, FAILED = 0, 1, 2  # codes of `solution.STATUS`
 ATTEMPTS, HELD = 30, 1e-10  # solves in which a bound is to be held, relative to it
@@ -141,11 +143,11 @@ class WrenchController:
         belief = self.belief
         return units(belief.mass, belief.gravity, belief.points, self.space.dim)
 
-    def workspace(self) -> tuple[Array | None, ...]:
+    def workspace(self) -> tuple[tuple[Any, ...] | None, ...]:
         """Scratch of the compiled loop, one for each thread."""
         nw, n = len(self.Q_w), len(self.Q_f)
         own = np.empty((3, 3)), np.empty((nw, n)), np.empty((nw, nw)), np.empty(6)
-        return (*own, *workspace(nw, len(self.contacts), self.space.dim))
+        return own, *workspace(nw, len(self.contacts), self.space.dim)
 
     def jacobian(self, orientation: Array) -> Array:
         """(nw, K d) contact Jacobian in object axes at an orientation (4,), object axes to world."""
@@ -194,7 +196,7 @@ def _lifted_frame(contact: Contact, here: Space, table: Array) -> Array:
     return np.column_stack([t, np.cross(n, t), n])
 
 
-@inlined
+@subroutine
 def _fill_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ignore[no-untyped-def]
     """Write R (3, 3), J (nw, K d) and the required wrench b (nw,) at one state."""
     fill_rotation(q, R)
@@ -210,16 +212,16 @@ state_problem = kernel(_fill_problem)  # called from Python
 
 @kernel
 def step_worlds(  # type: ignore[no-untyped-def]
-    belief, bounds, work, tolerance, q, omega, q_d, omega_d, alpha_d, external, required, wrench, force, residual,
-    status,
+    belief, bounds, own, planar, several, tolerance, q, omega, q_d, omega_d, alpha_d, external, required, wrench,
+    force, residual, status,
 ):  # fmt: skip
     """State, solve and certify the problem of every world; answers are written into the last five arrays.
 
     Args:
-        belief: `Belief`, shared by the worlds.
-        bounds: `WrenchBounds.stacked`. One that is not on a rate is kept, as a heavier weight; where that needs more
-            than `HEAVIEST` times the weight, or a second bound, the answer is that without bounds.
-        work: `WrenchController.workspace()`.
+        belief: the values of `Belief`, shared by the worlds.
+        bounds: the values of `WrenchBounds.stacked`, or None. One that is not on a rate is kept, as a heavier weight;
+            where that needs more than `HEAVIEST` times the weight, or a second bound, the answer is that without bounds.
+        own, planar, several: `WrenchController.workspace()`.
         tolerance: largest relative KKT residual of status 0 (solved).
         q: (W, 4) and omega: (W, 3), the measured orientations and angular velocities, world axes.
         q_d, omega_d, alpha_d: (W, 4), (W, 3), (W, 3), the reference now; (1, ...) is the same for all worlds.
@@ -230,38 +232,41 @@ def step_worlds(  # type: ignore[no-untyped-def]
         force: (W, K d) out, in contact axes.
         residual: (W,) out.  status: (W,) out, int8: 0 solved, 1 inaccurate, 2 failed.
     """
+    belief = Belief(*belief)
     nw = belief.wrench_map.shape[0]
-    R, J, Q, root, reduced, pull, scratch = work
+    R, J, heavier, root = own
     Q_w, Q_f, mu, f_min = belief.Q_w, belief.Q_f, belief.mu, belief.f_min  # taken out once: it shows in the plane
     for i in range(q.shape[0]):
         j, b = i % q_d.shape[0], required[i]
         _fill_problem(belief, q[i], omega[i], q_d[j], omega_d[j], alpha_d[j], R, J, b)
         for row in range(nw):
             b[row] -= external[i % external.shape[0], row]
-        ball = -1
-        for row in range(nw):
-            for column in range(nw):
-                Q[row, column] = Q_w[row, column]
+        ball, multiplier, Q = -1, 0.0, Q_w
         for attempt in range(ATTEMPTS + 1):
-            residual[i] = smallest_wrench(J, b, Q, Q_f, mu, f_min, force[i], wrench[i], reduced, pull, scratch)
+            if bounds is not None:
+                fill_heavier(Stacked(*bounds), ball, multiplier, Q_w, heavier)
+                Q = heavier
+            # Of what is None the compiler leaves the branch out, and all kernels that it calls.
+            if planar is not None:
+                residual[i] = planar_wrench(J, b, Q, Q_f, mu, f_min, force[i], wrench[i], planar)
+            if several is not None:
+                residual[i] = contact_wrench(J, b, Q, Q_f, mu, f_min, force[i], wrench[i], several)
+            if bounds is None:
+                break
             if attempt == 0:
-                ball = farthest_exceeded(bounds, wrench[i])
+                ball = farthest_exceeded(Stacked(*bounds), wrench[i])
                 if ball >= 0:
-                    begin_multiplier(bounds, ball, Q_w, root)
+                    begin_multiplier(Stacked(*bounds), ball, Q_w, root)
             if ball < 0 or not np.isfinite(residual[i]):
                 break
-            size = size_over(bounds, ball, wrench[i])
+            size = size_over(Stacked(*bounds), ball, wrench[i])
             if abs(size - 1.0) <= HELD:
                 residual[i] = max(residual[i], abs(size - 1.0))
                 break
             next_multiplier(root, size)
-            if attempt < ATTEMPTS - 1 and root[0] <= HEAVIEST * root[5]:
-                fill_heavier(bounds, ball, root[0], Q_w, Q)
-            else:  # out of reach: as without bounds
+            multiplier = root[0]
+            if attempt >= ATTEMPTS - 1 or multiplier > HEAVIEST * root[5]:  # out of reach: as without bounds
                 ball = -1
-                for row in range(nw):
-                    for column in range(nw):
-                        Q[row, column] = Q_w[row, column]
         if not np.isfinite(residual[i]):
             status[i] = FAILED
             for row in range(nw):

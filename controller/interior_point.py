@@ -5,15 +5,14 @@ Nesterov-Todd scaling and Mehrotra's predictor and corrector (Vandenberghe, "The
 program solvers", 2010), with s a function of f: every iterate is strictly feasible. A floor of 0 is no constraint.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from pivoting.controller.certificate import kkt_residual
-from pivoting.controller.closed_form import balancing_wrench
+from pivoting.controller.closed_form import balancing_wrench, reduce
 from pivoting.controller.dense import factor, solve_factored
 from pivoting.controller.kernel import subroutine
 from pivoting.controller.polish import gradient, polish, release
-from pivoting.controller.spatial_form import APEX, EDGE, FLOOR, INSIDE, RIM
+from pivoting.controller.spatial_form import APEX, EDGE, FLOOR, INSIDE, RIM, spatial_force
+from pivoting.controller.workspace import Work
 
 ITERATIONS = 60  # bound; 6 to 12 are usual
 GUESSES = 3  # polishes of one iterate, each on the pieces that the one before asked for
@@ -24,121 +23,76 @@ EXACT = 1e-13  # relative KKT residual at which nothing is left to improve
 P, Q, DP, DQ, C = 0, 1, 2, 3, 4  # columns of `Work.floor`
 
 
-class Work(NamedTuple):
-    """Scratch of the kernels for one problem size, see `views`; n = K d."""
-
-    H: np.ndarray  # (n, n) and (n,): the problem in f alone
-    h: np.ndarray
-    M: np.ndarray  # (n, n): the matrix being factored
-    x: np.ndarray  # (n,): right-hand side and step
-    z: np.ndarray  # (n,): gradient
-    moved: np.ndarray  # (n,): forces before a step
-    now: np.ndarray  # (n,): iterate
-    g: np.ndarray  # (n,): H f - h at the iterate
-    trial_f: np.ndarray  # (n,) and (nw,): an answer that may be better
-    trial_w: np.ndarray
-    pull: np.ndarray  # (2, nw): Q_w w, and |Q_w||w|
-    tangent: np.ndarray  # (n, d)
-    start: np.ndarray  # (K + 1,) int
-    piece: np.ndarray  # (K,) int
-    s: np.ndarray  # (K, 3): slack of the cones, (mu f_n, f_t, f_o); f_o = 0 in the plane
-    y: np.ndarray  # (K, 3): its multiplier
-    bar: np.ndarray  # (K, 4): scaling point and eta, see `_scale`
-    lam: np.ndarray  # (K, 4): scaled slack, which is also the scaled multiplier, and its determinant
-    u: np.ndarray  # (K, 3): scaled step of the slack
-    c: np.ndarray  # (K, 3): scaled corrector
-    floor: np.ndarray  # (K, 5): slack p = f_n - f_min, its multiplier q, dp, dq, corrector
-
-
-def scratch_size(nw: int, K: int, dim: int) -> int:
-    """Length of the scratch of `views`: K contacts of `dim` forces, wrenches of nw components."""
-    n = K * dim
-    return 2 * n * n + n * dim + 7 * n + nw + 27 * K + 1
-
-
 @subroutine
-def reduced_views(scratch, n):  # type: ignore[no-untyped-def]
-    """H (n, n), h (n,) and scratch (n,) for `reduce`: the first parts of a scratch."""
-    end = n * n
-    return scratch[:end].reshape(n, n), scratch[end : end + n], scratch[end + n : end + 2 * n]
+def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no-untyped-def]
+    """Write the optimal contact forces f (n,) and wrench w (nw,), and return their relative KKT residual.
 
+    One contact in space is solved in closed form, and polished where that does not suffice; several, or what is still
+    not exact, by the interior point. Bounded in time; all nan where the problem is not finite.
 
-@subroutine
-def views(scratch, pull, K, dim):  # type: ignore[no-untyped-def]
-    """The parts of a scratch, which is handed around whole: passing 21 arrays would cost more than a planar solve."""
-    n = K * dim
-    H, h, x = reduced_views(scratch, n)
-    end = n * n + 2 * n
-    M, end = scratch[end : end + n * n].reshape(n, n), end + n * n
-    rows, end = scratch[end : end + 5 * n].reshape(5, n), end + 5 * n
-    tangent, end = scratch[end : end + n * dim].reshape(n, dim), end + n * dim
-    nw = pull.shape[1]
-    trial_w, end = scratch[end : end + nw], end + nw
-    triples, end = scratch[end : end + 12 * K].reshape(4, K, 3), end + 12 * K
-    fours, end = scratch[end : end + 8 * K].reshape(2, K, 4), end + 8 * K
-    floor, end = scratch[end : end + 5 * K].reshape(K, 5), end + 5 * K
-    counts = scratch[end : end + 2 * K + 1].view(np.int64)
-    return Work(
-        H, h, M, x, rows[0], rows[1], rows[2], rows[3], rows[4], trial_w, pull, tangent, counts[: K + 1], counts[K + 1 :],
-        triples[0], triples[1], fours[0], fours[1], triples[2], triples[3], floor,
-    )  # fmt: skip
-
-
-@subroutine
-def contact_forces(J, b, Q_w, Q_f, mu, f_min, guessed, f, w, work):  # type: ignore[no-untyped-def]
-    """Write the optimum into f (n,) and w (nw,), given finite H and h in `work`; return its relative KKT residual."""
-    n, K = f.shape[0], mu.shape[0]
-    dim = n // K
-    H, h, M, x, g, now = work.H, work.h, work.M, work.x, work.g, work.now
+    Args:
+        J: (nw, n); b: (nw,) [N, N m]; Q_w: (nw, nw); Q_f: (n, n); mu (planned), f_min [N]: (K,).
+        scratch: the values of a `Work`, see `workspace`.
+    """
+    work, n, K = Work(*scratch), f.shape[0], mu.shape[0]
     best = np.inf
-    if not _finite(H, h, mu, f_min):
+    H, h, M, x, g, now = work.H, work.h, work.M, work.x, work.g, work.now
+    size = reduce(J, b, Q_w, Q_f, H, h, x)
+    for i in range(K):
+        size += mu[i] + f_min[i]
+    if not np.isfinite(size):
         for i in range(n):
             f[i] = np.nan
         balancing_wrench(J, b, f, w)
         return np.nan
-    if guessed:
-        for i in range(n):
-            now[i] = f[i]
-        best = _try(J, b, Q_w, Q_f, mu, f_min, dim, 1, f, w, best, work)
+    if n == 3:  # exact up to eps cond(H): most problems need no more
+        work.piece[0] = spatial_force(H, h, mu[0], f_min[0], f)
+        balancing_wrench(J, b, f, w)
+        best = kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, work.pull)
         if best <= EXACT:
             return best
-    if _nothing_pulls(h, mu, f_min, dim):  # f = 0 is optimal, exactly
+        for i in range(n):
+            now[i] = f[i]
+        best = _try(J, b, Q_w, Q_f, mu, f_min, work.axes, 1, f, w, best, work)
+        if best <= EXACT:
+            return best
+    if _nothing_pulls(h, mu, f_min, work.axes):  # f = 0 is optimal, exactly
         for i in range(n):
             now[i] = 0.0
-        return _try(J, b, Q_w, Q_f, mu, f_min, dim, 0, f, w, best, work)
+        return _try(J, b, Q_w, Q_f, mu, f_min, work.axes, 0, f, w, best, work)
     for i in range(n):
         now[i] = h[i]
         for j in range(n):
             M[i, j] = H[i, j]
     factor(M, n)
     solve_factored(M, now, n)
-    if _inside(mu, f_min, dim, now):
+    if _inside(mu, f_min, work.axes, now):
         for i in range(K):
             work.piece[i] = INSIDE
-        best = _try(J, b, Q_w, Q_f, mu, f_min, dim, GUESSES, f, w, best, work)
+        best = _try(J, b, Q_w, Q_f, mu, f_min, work.axes, GUESSES, f, w, best, work)
         if best <= EXACT:
             return best
-    cones = _start(H, h, mu, f_min, dim, work)
+    cones = _start(H, h, mu, f_min, work.axes, work)
     goal, least = FIRST_GOAL, np.inf
     for _ in range(ITERATIONS):
-        gap, left, size = _measure(mu, f_min, dim, work)
+        gap, left, size = _measure(mu, f_min, work.axes, work)
         if not gap + left < np.inf:
             break
         if gap + left <= goal * size:
             _guess(mu, f_min, work)
-            best = _try(J, b, Q_w, Q_f, mu, f_min, dim, GUESSES, f, w, best, work)
+            best = _try(J, b, Q_w, Q_f, mu, f_min, work.axes, GUESSES, f, w, best, work)
             if best <= EXACT or goal < 1e-13:
                 break
             goal *= 1e-2
         for i in range(n):
             for j in range(i, n):
                 M[i, j] = H[i, j]
-        _scale(mu, f_min, dim, work)
+        _scale(mu, f_min, work.axes, work)
         factor(M, n)
         for i in range(n):
             x[i] = -g[i]
         solve_factored(M, x, n)
-        alpha = min(1.0, _step_length(mu, f_min, dim, False, work))
+        alpha = min(1.0, _step_length(mu, f_min, work.axes, False, work))
         # Mehrotra's rule alone can cycle: the second-order term is only as good as the predictor is long (Colombo and
         # Gondzio 2008), and without progress one step is taken towards the central path instead. The gap must not run
         # ahead of the dual residual either, or the iterates end at a boundary far from the optimum.
@@ -146,27 +100,28 @@ def contact_forces(J, b, Q_w, Q_f, mu, f_min, guessed, f, w, work):  # type: ign
         if gap + left > 0.9 * least:
             sigma, second = max(sigma, 0.5), 0.0
         least = min(least, gap + left)
-        _correct(mu, f_min, dim, sigma * max(gap, left) / cones, second, work)
+        _correct(mu, f_min, work.axes, sigma * max(gap, left) / cones, second, work)
         solve_factored(M, x, n)
-        alpha = 0.99 * _step_length(mu, f_min, dim, True, work)
+        alpha = 0.99 * _step_length(mu, f_min, work.axes, True, work)
         if alpha <= 1e-12:
             break
         _advance(f_min, min(1.0, alpha), work)
     if best > EXACT:
-        best = _try(J, b, Q_w, Q_f, mu, f_min, dim, 0, f, w, best, work)
+        best = _try(J, b, Q_w, Q_f, mu, f_min, work.axes, 0, f, w, best, work)
     return best
 
 
 @subroutine
-def _try(J, b, Q_w, Q_f, mu, f_min, dim, polishes, f, w, best, work):  # type: ignore[no-untyped-def]
+def _try(J, b, Q_w, Q_f, mu, f_min, axes, polishes, f, w, best, work):  # type: ignore[no-untyped-def]
     """Polish the iterate, or with no polishes take it as it is; keep it in f and w if its certificate is better."""
+    dim = len(axes)
     trial_f, trial_w = work.trial_f, work.trial_w
     for _ in range(max(polishes, 1)):
         for i in range(f.shape[0]):
             trial_f[i] = work.now[i]
         balancing_wrench(J, b, trial_f, trial_w)
         if polishes > 0:
-            polish(J, Q_w, Q_f, work.H, mu, f_min, dim, work.piece, trial_f, trial_w, work)
+            polish(J, Q_w, Q_f, work.H, mu, f_min, axes, work.piece, trial_f, trial_w, work)
         residual = kkt_residual(J, b, Q_w, Q_f, mu, f_min, trial_w, trial_f, work.pull)
         if residual < best:
             best = residual
@@ -177,27 +132,15 @@ def _try(J, b, Q_w, Q_f, mu, f_min, dim, polishes, f, w, best, work):  # type: i
         if best <= EXACT or polishes == 0:
             return best
         gradient(J, Q_w, Q_f, trial_w, trial_f, work.pull, work.z)
-        if not release(mu, dim, work.piece, trial_f, work.z):
+        if not release(mu, axes, work.piece, trial_f, work.z):
             return best
     return best
 
 
 @subroutine
-def _finite(H, h, mu, f_min):  # type: ignore[no-untyped-def]
-    """Is the problem finite?"""
-    total = 0.0
-    for i in range(h.shape[0]):
-        total += h[i]
-        for j in range(h.shape[0]):
-            total += H[i, j]
-    for i in range(mu.shape[0]):
-        total += mu[i] + f_min[i]
-    return np.isfinite(total)
-
-
-@subroutine
-def _nothing_pulls(h, mu, f_min, dim):  # type: ignore[no-untyped-def]
+def _nothing_pulls(h, mu, f_min, axes):  # type: ignore[no-untyped-def]
     """Is -h in every dual cone, and no floor above 0: then f = 0 is the optimum."""
+    dim = len(axes)
     for i in range(mu.shape[0]):
         n = (i + 1) * dim - 1
         size = np.hypot(h[n - 2], h[n - 1]) if dim == 3 else abs(h[n - 1])
@@ -207,8 +150,9 @@ def _nothing_pulls(h, mu, f_min, dim):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def _inside(mu, f_min, dim, f):  # type: ignore[no-untyped-def]
+def _inside(mu, f_min, axes, f):  # type: ignore[no-untyped-def]
     """Is every force (n,) in its truncated cone?"""
+    dim = len(axes)
     for i in range(mu.shape[0]):
         n = (i + 1) * dim - 1
         size = np.hypot(f[n - 2], f[n - 1]) if dim == 3 else abs(f[n - 1])
@@ -218,11 +162,12 @@ def _inside(mu, f_min, dim, f):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def _start(H, h, mu, f_min, dim, work):  # type: ignore[no-untyped-def]
+def _start(H, h, mu, f_min, axes, work):  # type: ignore[no-untyped-def]
     """From the free minimum in `now` to a strictly feasible start with multipliers on the central path's scale.
 
     Returns the number of cones.
     """
+    dim = len(axes)
     K = mu.shape[0]
     now, s, y, floor = work.now, work.s, work.y, work.floor
     largest = 0.0
@@ -242,7 +187,7 @@ def _start(H, h, mu, f_min, dim, work):  # type: ignore[no-untyped-def]
             y[i, a] = s[i, a] = 0.0
         for a in range(5):
             floor[i, a] = 0.0
-    _measure(mu, f_min, dim, work)
+    _measure(mu, f_min, axes, work)
     cones = 0
     level = 0.0
     for i in range(K * dim):
@@ -259,8 +204,9 @@ def _start(H, h, mu, f_min, dim, work):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def _measure(mu, f_min, dim, work):  # type: ignore[no-untyped-def]
+def _measure(mu, f_min, axes, work):  # type: ignore[no-untyped-def]
     """Slacks and gradient of the iterate; its gap, what is left of the dual residual, and the size of both."""
+    dim = len(axes)
     H, h, now, g, s, y, floor = work.H, work.h, work.now, work.g, work.s, work.y, work.floor
     n = h.shape[0]
     for i in range(n):
@@ -323,11 +269,12 @@ def _unscale(b0, b1, b2, eta, v0, v1, v2):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def _scale(mu, f_min, dim, work):  # type: ignore[no-untyped-def]
+def _scale(mu, f_min, axes, work):  # type: ignore[no-untyped-def]
     """The Nesterov-Todd scaling W y = W^-1 s = lam of every cone, and M += A'W^-2 A block by block.
 
     W^2 = eta^2 (2 b b' - diag(1, -1, -1)), so W^-2 = (2 v v' - diag(1, -1, -1)) / eta^2 with v = (b_0, -b_1, -b_2).
     """
+    dim = len(axes)
     M, s, y, bar, lam, floor = work.M, work.s, work.y, work.bar, work.lam, work.floor
     for i in range(mu.shape[0]):
         s0, s1, s2, y0, y1, y2 = s[i, 0], s[i, 1], s[i, 2], y[i, 0], y[i, 1], y[i, 2]
@@ -356,12 +303,13 @@ def _scale(mu, f_min, dim, work):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def _step_length(mu, f_min, dim, corrected, work):  # type: ignore[no-untyped-def]
+def _step_length(mu, f_min, axes, corrected, work):  # type: ignore[no-untyped-def]
     """The steps that belong to the step x of f, and how far (<= 2) they may be followed to the first boundary.
 
     u = W^-1 ds and W dy = c - lam - u, with c = 0 in the predictor, whose length is only a measure and is taken in the
     scaled cones; the corrector's is taken in the cones themselves and dy is written into c.
     """
+    dim = len(axes)
     x, s, y, bar, lam, u, c, floor = work.x, work.s, work.y, work.bar, work.lam, work.u, work.c, work.floor
     alpha = 2.0
     for i in range(mu.shape[0]):
@@ -405,8 +353,9 @@ def _reach(v0, v1, v2, d0, d1, d2):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def _correct(mu, f_min, dim, target, second, work):  # type: ignore[no-untyped-def]
+def _correct(mu, f_min, axes, target, second, work):  # type: ignore[no-untyped-def]
     r"""From the predictor's steps: c = lam \ (target e - second (W^-1 ds) o (W dy)), and x = -g + A'W^-1 c."""
+    dim = len(axes)
     x, g, u, lam, c, bar, floor = work.x, work.g, work.u, work.lam, work.c, work.bar, work.floor
     for i in range(mu.shape[0]):
         t, e = i * dim, (i + 1) * dim - 1

@@ -5,7 +5,7 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.kernel import inlined
+from pivoting.controller.kernel import subroutine
 from pivoting.controller.space import component, cross, into, rotation_error
 from pivoting.controller.validate import number, one_of, positive_definite
 
@@ -90,7 +90,7 @@ class Law:
         return float(self.feedforward), float(self.kp), float(self.kd), float(self.velocity_terms)
 
 
-@inlined
+@subroutine
 def fill_required(R, q, omega, q_d, omega_d, alpha_d, law, mass, inertia, gravity, pivot, offset, wrench_map, out):  # type: ignore[no-untyped-def]
     """Write the required wrench (nw,) in object axes: what contact and applied wrench must make together.
 

@@ -35,7 +35,7 @@ def gradient(J, Q_w, Q_f, w, f, pull, z):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def polish(J, Q_w, Q_f, H, mu, f_min, dim, piece, f, w, work):  # type: ignore[no-untyped-def]
+def polish(J, Q_w, Q_f, H, mu, f_min, axes, piece, f, w, work):  # type: ignore[no-untyped-def]
     """Improve f (n,) and w (nw,) in place, staying on the pieces `piece` (K,) int, which a blocked step may change.
 
     w is carried along as w - J (change of f) and not recomputed as b - J f: where w is what is left of two large terms
@@ -45,19 +45,20 @@ def polish(J, Q_w, Q_f, H, mu, f_min, dim, piece, f, w, work):  # type: ignore[n
         H: (n, n) = Q_f + J'Q_w J, see `reduce`.
         work: `Work`; M, x, z, pull, tangent, start and moved are used.
     """
+    dim = len(axes)
     K = mu.shape[0]
     M, x, z, tangent, start, moved = work.M, work.x, work.z, work.tangent, work.start, work.moved
     for i in range(K):
         for p in range(i * dim, (i + 1) * dim):
             moved[p] = f[p]
-        _land(mu[i], f_min[i], dim, piece, i, f[i * dim : (i + 1) * dim])
+        _land(mu[i], f_min[i], axes, piece, i, f[i * dim : (i + 1) * dim])
     _carry(J, f, moved, w)
     for _ in range(STEPS):
         gradient(J, Q_w, Q_f, w, f, work.pull, z)
         m = 0
         for i in range(K):
             start[i] = m
-            m += _tangents(mu[i], dim, piece[i], i * dim, f, tangent)
+            m += _tangents(mu[i], axes, piece[i], i * dim, f, tangent)
         start[K] = m
         if m == 0:
             return
@@ -89,7 +90,7 @@ def polish(J, Q_w, Q_f, H, mu, f_min, dim, piece, f, w, work):  # type: ignore[n
         for i in range(K):
             for p in range(i * dim, (i + 1) * dim):
                 moved[p] = f[p]
-            changed |= _move(mu[i], f_min[i], dim, piece, i, start[i], x, tangent, f)
+            changed |= _move(mu[i], f_min[i], axes, piece, i, start[i], x, tangent, f)
             for p in range(i * dim, (i + 1) * dim):
                 size = max(size, abs(f[p]))
                 step = max(step, abs(f[p] - moved[p]))
@@ -109,8 +110,9 @@ def _carry(J, f, before, w):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def _tangents(mu, dim, piece, at, f, tangent):  # type: ignore[no-untyped-def]
+def _tangents(mu, axes, piece, at, f, tangent):  # type: ignore[no-untyped-def]
     """Write d f / d coordinates of the contact at rows at, at + 1, ... of tangent (n, dim); return how many."""
+    dim = len(axes)
     n = at + dim - 1
     if piece == APEX:
         return 0
@@ -133,8 +135,9 @@ def _tangents(mu, dim, piece, at, f, tangent):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def _move(mu, f_min, dim, piece, i, first, x, tangent, f):  # type: ignore[no-untyped-def]
+def _move(mu, f_min, axes, piece, i, first, x, tangent, f):  # type: ignore[no-untyped-def]
     """Move contact i by its step x[first:]; True where it changed its piece, being stopped by another one."""
+    dim = len(axes)
     at, n, kind = i * dim, i * dim + dim - 1, piece[i]
     if kind == APEX or (kind == RIM and dim == 2):
         return False
@@ -149,12 +152,13 @@ def _move(mu, f_min, dim, piece, i, first, x, tangent, f):  # type: ignore[no-un
             f[at], f[at + 1] = f[at] - turn * f[at + 1], f[at + 1] + turn * f[at]
         if kind == EDGE:
             f[n] += x[first]
-    return _land(mu, f_min, dim, piece, i, f[at : at + dim])
+    return _land(mu, f_min, axes, piece, i, f[at : at + dim])
 
 
 @subroutine
-def _land(mu, f_min, dim, piece, i, force):  # type: ignore[no-untyped-def]
+def _land(mu, f_min, axes, piece, i, force):  # type: ignore[no-untyped-def]
     """Put a force (dim,) exactly on its piece; True where that is not the piece it was on, which it left."""
+    dim = len(axes)
     kind, n = piece[i], dim - 1
     size = np.hypot(force[0], force[1]) if dim == 3 else abs(force[0])
     if kind in (INSIDE, EDGE) and force[n] <= f_min:
@@ -179,8 +183,9 @@ def _land(mu, f_min, dim, piece, i, force):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def release(mu, dim, piece, f, z):  # type: ignore[no-untyped-def]
+def release(mu, axes, piece, f, z):  # type: ignore[no-untyped-def]
     """Leave the pieces whose multipliers (z is the gradient, (n,)) have the wrong sign; True where there was one."""
+    dim = len(axes)
     changed = False
     for i in range(mu.shape[0]):
         at, n, kind = i * dim, i * dim + dim - 1, piece[i]

@@ -10,11 +10,14 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from pivoting.controller.closed_form import planar_wrench
 from pivoting.controller.conic import CLARABEL, Answer, clarabel_answer, scaled, split
-from pivoting.controller.dispatch import solve_one, workspace
+from pivoting.controller.interior_point import contact_wrench
+from pivoting.controller.kernel import kernel
 from pivoting.controller.problem import WrenchProblem
 from pivoting.controller.solution import INSCRIBED, STATUS, TOLERANCE, Solution, SolveError, certified
 from pivoting.controller.validate import fail, number
+from pivoting.controller.workspace import workspace
 
 __all__ = ["INSCRIBED", "STATUS", "TOLERANCE", "Solution", "SolveError", "methods", "pyramid_excess", "solve"]
 
@@ -81,7 +84,9 @@ def methods() -> tuple[str, ...]:
     return ("closed-form", "clarabel", *(f"qp:{name}" for name in sorted(_installed()) if _answers(name)))
 
 
+solve_planar, solve_contacts = kernel(planar_wrench), kernel(contact_wrench)
 Options = dict[str, Any]
+solve_planar, solve_contacts = kernel(planar_wrench), kernel(contact_wrench)
 
 
 def _edges(problem: WrenchProblem, method: str, options: Options) -> int:
@@ -158,7 +163,11 @@ def _compiled(problem: WrenchProblem, options: Options, edges: int) -> Answer:
     # copies that may be written, as in the loop: of read-only arrays numba would compile everything again
     stated = [np.array(values) for values in (problem.jacobian, problem.required, problem.Q_w, problem.Q_f)]
     cones = np.array(problem.mu_planned), np.array(problem.f_min)
-    solve_one(*stated, *cones, f, w, *workspace(nw, problem.contacts, problem.dim))
+    planar, several = workspace(nw, problem.contacts, problem.dim)
+    if planar is not None:
+        solve_planar(*stated, *cones, f, w, planar)
+    else:
+        solve_contacts(*stated, *cones, f, w, several)
     return w, f, "compiled kernel"
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.kernel import elementwise, inlined, kernel, subroutine
+from pivoting.controller.kernel import elementwise, kernel, subroutine
 from pivoting.controller.validate import Array, array, fail, unit_quaternions
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
@@ -111,7 +111,7 @@ def tilt(angle: float) -> Array:
     return np.array([np.cos(0.5 * angle), 0.0, -np.sin(0.5 * angle), 0.0])
 
 
-@inlined
+@subroutine
 def fill_product(p, q, out):  # type: ignore[no-untyped-def]
     """Write the Hamilton product of quaternions (4,) (w, x, y, z) into out, which may be one of them."""
     w = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3]
@@ -127,7 +127,7 @@ def quaternion_product(p, q, out):  # type: ignore[no-untyped-def]
     fill_product(p, q, out)
 
 
-@inlined
+@subroutine
 def fill_rotation(q, out):  # type: ignore[no-untyped-def]
     """Write the rotation matrix (3, 3) of quaternion q (4,) into out; q need not be exactly of unit length."""
     w, x, y, z = q[0], q[1], q[2], q[3]

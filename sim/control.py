@@ -59,15 +59,15 @@ class _Law:
     """The controller's law for all worlds, as far as the compiled loop keeps bounds."""
 
     def __init__(self, controller: WrenchController, bounds: WrenchBounds):
-        self._belief, self._work = controller.belief, controller.workspace()
-        self._bounds = bounds.stacked(len(controller.Q_w))
+        self._belief, self._work = tuple(controller.belief), controller.workspace()
+        self._bounds = tuple(bounds.stacked(len(controller.Q_w))) if bounds.any else None
         self._none = np.zeros((1, len(controller.Q_w)))
 
     def __call__(self, states: States, desired: list[Array], out: Answers, external: Array | None = None) -> None:
         """`desired`: orientations, angular velocities, accelerations; `external`: see `step_worlds`, None for none."""
         measured = states.orientation, states.angular_velocity
         known = self._none if external is None else external
-        step_worlds(self._belief, self._bounds, self._work, TOLERANCE, *measured, *desired, known, *out)
+        step_worlds(self._belief, self._bounds, *self._work, TOLERANCE, *measured, *desired, known, *out)
 
 
 class LawControl:

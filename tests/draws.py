@@ -4,14 +4,14 @@ from typing import NamedTuple
 
 import clarabel
 import numpy as np
-from numba import njit
 from pivoting.controller import WrenchProblem
 from pivoting.controller.certificate import kkt_residual
-from pivoting.controller.closed_form import balancing_wrench, reduce
-from pivoting.controller.dispatch import smallest_wrench, workspace
-from pivoting.controller.interior_point import views
+from pivoting.controller.closed_form import balancing_wrench, planar_wrench, reduce
+from pivoting.controller.interior_point import contact_wrench
+from pivoting.controller.kernel import kernel
 from pivoting.controller.polish import polish
 from pivoting.controller.spatial_form import spatial_force
+from pivoting.controller.workspace import Work, workspace
 from scipy import sparse
 
 SETS = ("scattered", "line", "point", "face", "plane", "edge")
@@ -136,29 +136,31 @@ def _pieces(many: Data, force: np.ndarray) -> np.ndarray:
     return np.array([[PIECES.index(name) for name in row] for row in names])
 
 
-@njit
-def _loop(J, b, Q_w, Q_f, mu, f_min, f, w, residual, reduced, pull, scratch):  # type: ignore[no-untyped-def]
+@kernel
+def _loop(J, b, Q_w, Q_f, mu, f_min, f, w, residual, planar, several):  # type: ignore[no-untyped-def]
     for i in range(J.shape[0]):
-        residual[i] = smallest_wrench(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], f[i], w[i], reduced, pull, scratch)
+        if planar is not None:
+            residual[i] = planar_wrench(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], f[i], w[i], planar)
+        if several is not None:
+            residual[i] = contact_wrench(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], f[i], w[i], several)
 
 
 def closed_form_residuals(many: Data) -> np.ndarray:
     """(N,) residuals of one contact in space by closed form and polish alone."""
     out = np.empty(len(many.required))
-    _closed_form(*many, out, *workspace(6, 1, 3)[1:])
+    _closed_form(*many, out, np.empty(3), np.empty(6), workspace(6, 1, 3)[1])
     return out
 
 
-@njit
-def _closed_form(J, b, Q_w, Q_f, mu, f_min, residual, pull, scratch):  # type: ignore[no-untyped-def]
-    work = views(scratch, pull, 1, 3)
-    f, w = np.empty(3), np.empty(6)
+@kernel
+def _closed_form(J, b, Q_w, Q_f, mu, f_min, residual, f, w, scratch):  # type: ignore[no-untyped-def]
+    work = Work(*scratch)
     for i in range(J.shape[0]):
         reduce(J[i], b[i], Q_w[i], Q_f[i], work.H, work.h, work.x)
         work.piece[0] = spatial_force(work.H, work.h, mu[i, 0], f_min[i, 0], f)
         balancing_wrench(J[i], b[i], f, w)
-        polish(J[i], Q_w[i], Q_f[i], work.H, mu[i], f_min[i], 3, work.piece, f, w, work)
-        residual[i] = kkt_residual(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], w, f, pull)
+        polish(J[i], Q_w[i], Q_f[i], work.H, mu[i], f_min[i], work.axes, work.piece, f, w, work)
+        residual[i] = kkt_residual(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], w, f, work.pull)
 
 
 def whitened_objective(problem: WrenchProblem) -> float:

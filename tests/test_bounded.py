@@ -177,12 +177,13 @@ def test_a_bound_is_a_heavier_weight(controller: WrenchController, kind: str) ->
     """
     rng, still, held, left = np.random.default_rng(5), np.zeros((1, 3)), 0, 0
     nw, n, dim = len(controller.Q_w), len(controller.Q_f), controller.space.dim
-    belief, work, units = controller.belief, controller.workspace(), controller.units
+    belief, work, units = tuple(controller.belief), controller.workspace(), controller.units
 
     def step(bounds: WrenchBounds, angle: float, wanted: float) -> tuple[np.ndarray, ...]:
         out = np.empty((1, nw)), np.empty((1, nw)), np.empty((1, n)), np.empty(1), np.empty(1, np.int8)
         q, q_d = tilted(angle)[None], tilted(wanted)[None]
-        step_worlds(belief, bounds.stacked(nw), work, 1e-9, q, still, q_d, still, still, np.zeros((1, nw)), *out)
+        held = tuple(bounds.stacked(nw))
+        step_worlds(belief, held, *work, 1e-9, q, still, q_d, still, still, np.zeros((1, nw)), *out)
         assert out[4][0] == 0
         return tuple(values[0] for values in out[:3])
 

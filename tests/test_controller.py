@@ -46,8 +46,8 @@ def stepped(
     out = Stepped(np.ones((W, nw)), np.ones((W, nw)), np.ones((W, n)), np.ones(W), np.full(W, 9, np.int8))
     reference = [values[None] for values in controller.space.lift_motion(desired)]
     known = np.zeros((1, nw)) if external is None else external
-    free = WrenchBounds().stacked(nw)
-    step_worlds(controller.belief, free, controller.workspace(), tolerance, q, omega, *reference, known, *out)
+    belief = tuple(controller.belief)
+    step_worlds(belief, None, *controller.workspace(), tolerance, q, omega, *reference, known, *out)
     return out
 
 
