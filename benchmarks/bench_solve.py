@@ -17,8 +17,9 @@ import mujoco
 import numpy as np
 from harness import main, peer_table, timed
 from pivoting.controller import ClarabelWorkspace, WrenchProblem, methods, pyramid_excess, solve
+from pivoting.controller.closed_form import planar_wrench
 from pivoting.controller.conic import CLARABEL, ConicForm, conic_form
-from pivoting.controller.dispatch import solve_one
+from pivoting.controller.interior_point import contact_wrench
 from pivoting.controller.validate import Array
 from pivoting.controller.workspace import workspace
 from rich import print as show
@@ -69,7 +70,8 @@ def kernel(first: Instance) -> Route:
     """The compiled entry, called with arrays and a workspace that the caller keeps and writes each problem into."""
     nw, n = first.problem.jacobian.shape
     held, f, w = [np.array(values, order="C") for values in first.data], np.empty(n), np.empty(nw)
-    work = workspace(nw, first.problem.contacts, first.problem.dim)
+    planar, several = workspace(nw, first.problem.contacts, first.problem.dim)
+    entry, scratch = (contact_wrench, several) if planar is None else (planar_wrench, planar)
 
     def prepare(it: Instance) -> tuple[Array, ...]:
         for mine, theirs in zip(held, it.data, strict=True):
@@ -77,7 +79,7 @@ def kernel(first: Instance) -> Route:
         return tuple(held)
 
     def run(J: Array, b: Array, Q_w: Array, Q_f: Array, mu: Array, f_min: Array) -> Array:
-        solve_one(J, b, Q_w, Q_f, mu, f_min, f, w, *work)
+        entry(J, b, Q_w, Q_f, mu, f_min, f, w, scratch)
         return f
 
     return prepare, run

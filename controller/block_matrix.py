@@ -69,15 +69,15 @@ class BlockMatrix:
         data = self._data.copy()
         if len(values) != len(self._slots):
             raise ValueError(f"{len(values)} arrays for {len(self._slots)} parts that change")
-        if values:
-            _scatter(self._slots, self._entries, values, data)
+        for slots, entries, blocks in zip(self._slots, self._entries, values, strict=True):
+            _scatter(slots, entries, blocks, data)
         return Sparse(data, self._indices, self._indptr, self.shape)
 
 
 @kernel
-def _scatter(slots, entries, values, data):  # type: ignore[no-untyped-def]
-    for k in range(len(values)):
-        width = values[k].shape[2]
-        for s in range(slots[k].shape[0]):
-            for e in range(slots[k].shape[1]):
-                data[slots[k][s, e]] = values[k][s, entries[k][e] // width, entries[k][e] % width]
+def _scatter(slots, entries, blocks, data):  # type: ignore[no-untyped-def]
+    """Write the entries (e,) of blocks (S, r, c) into data at slots (S, e)."""
+    width = blocks.shape[2]
+    for s in range(slots.shape[0]):
+        for e in range(slots.shape[1]):
+            data[slots[s, e]] = blocks[s, entries[e] // width, entries[e] % width]

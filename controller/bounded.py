@@ -14,7 +14,7 @@ from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.conic_program import ClarabelInPlace, Cones, ConicProgram
 from pivoting.controller.contact_set import free_axes
 from pivoting.controller.controller import WrenchController
-from pivoting.controller.kernel import allocating
+from pivoting.controller.kernel import kernel
 from pivoting.controller.limits import friction_limits, wrench_limits
 from pivoting.controller.space import component, cross, fill_rotation, into
 from pivoting.controller.validate import Array, number
@@ -115,7 +115,7 @@ class BoundedSolver:
         b[:nw] = required / self._scale
         self._bounds.place(b, self._first, None if before is None else np.asarray(before, dtype=float) / self._scale)
         turning = np.empty((nw, len(self._axes)))
-        _fill_turning(self._axes, np.array(orientation), self._belief, self._scale, turning)
+        _fill_turning(self._axes, np.array(orientation), self._belief, self._scale, np.empty((3, 3)), turning)
         program = ConicProgram(self._P, self._q, self._A.filled((scaled[None], turning[None])), b, self._cones)
         answer = self._solve(program)
         force, wrench = answer.x[:n] * self._unit, answer.x[n : n + nw] * self._scale
@@ -129,19 +129,19 @@ class BoundedSolver:
         )  # fmt: skip
 
 
-@allocating
-def _fill_turning(axes, q, belief, scale, out):  # type: ignore[no-untyped-def]
+@kernel
+def _fill_turning(axes, q, belief, scale, R, out):  # type: ignore[no-untyped-def]
     """Write -B (nw, A), the wrenches that accelerate the object about its free axes, with entries up to 1, in `scale`.
 
     Args:
-        axes: (A, 3) object axes.  q: (4,) object axes to world.
+        axes: (A, 3) object axes.  q: (4,) object axes to world.  R: (3, 3) scratch.
     """
-    R, p, o, inertia = np.empty((3, 3)), belief.pivot, belief.offset, belief.inertia
+    p, o, inertia = belief.pivot, belief.offset, belief.inertia
     fill_rotation(q, R)
     o0, o1, o2 = into(R, o[0], o[1], o[2])
     most = 1e-300
     for j in range(axes.shape[0]):
-        a0, a1, a2 = axes[j]
+        a0, a1, a2 = axes[j, 0], axes[j, 1], axes[j, 2]
         F0, F1, F2 = cross(a0, a1, a2, p[0] + o0, p[1] + o1, p[2] + o2)  # minus the acceleration of the CoM
         M0 = -(inertia[0, 0] * a0 + inertia[0, 1] * a1 + inertia[0, 2] * a2)
         M1 = -(inertia[1, 0] * a0 + inertia[1, 1] * a1 + inertia[1, 2] * a2)
@@ -150,4 +150,6 @@ def _fill_turning(axes, q, belief, scale, out):  # type: ignore[no-untyped-def]
         for row in range(out.shape[0]):
             out[row, j] = component(belief.wrench_map, row, m * F0, m * F1, m * F2, M0, M1, M2) / scale[row]
             most = max(most, abs(out[row, j]))
-    out /= most
+    for row in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[row, j] /= most

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pivoting.controller.kernel import allocating, subroutine
+from pivoting.controller.kernel import kernel, subroutine
 from pivoting.controller.validate import Array, fail
 
 
@@ -113,7 +113,7 @@ class WrenchBounds:
         return float(out.max(initial=-1.0))
 
 
-@allocating
+@kernel
 def fill_excess(stacked, wrench, before, dt, out):  # type: ignore[no-untyped-def]
     """Write by how much each of wrenches (W, nw) exceeds a bound, relative to it, into out (W,); -1 without any bound.
 
@@ -123,13 +123,11 @@ def fill_excess(stacked, wrench, before, dt, out):  # type: ignore[no-untyped-de
         stacked: of `WrenchBounds.stacked`.
         before: (W, nw) applied `dt` [s] earlier; the wrenches themselves leave rates out.
     """
-    most, rate = -1.0, np.empty(wrench.shape[1])
+    most = -1.0
     for i in range(wrench.shape[0]):
         worst = -1.0
-        for j in range(wrench.shape[1]):
-            rate[j] = (wrench[i, j] - before[i, j]) / dt
         for k in range(stacked.radius.shape[0]):
-            over = (size_over(stacked, k, rate) if stacked.rate[k] else size_over(stacked, k, wrench[i])) - 1.0
+            over = size_over(stacked, k, wrench[i], before[i], dt) - 1.0
             if over > worst or np.isnan(over):
                 worst = over
         out[i] = worst
@@ -138,13 +136,14 @@ def fill_excess(stacked, wrench, before, dt, out):  # type: ignore[no-untyped-de
 
 
 @subroutine
-def size_over(stacked, k, vector):  # type: ignore[no-untyped-def]
-    """|rows v| over the radius of ball k, v (nw,) a wrench or its rate."""
+def size_over(stacked, k, wrench, before, dt):  # type: ignore[no-untyped-def]
+    """|rows v| over the radius of ball k; v is a wrench (nw,), or its change from `before` over dt for a rate."""
     square = 0.0
     for row in range(stacked.first[k], stacked.first[k + 1]):
         value = 0.0
-        for j in range(vector.shape[0]):
-            value += stacked.rows[row, j] * vector[j]
+        for j in range(wrench.shape[0]):
+            part = (wrench[j] - before[j]) / dt if stacked.rate[k] else wrench[j]
+            value += stacked.rows[row, j] * part
         square += value * value
     return np.sqrt(square) / stacked.radius[k]
 
@@ -154,7 +153,7 @@ def farthest_exceeded(stacked, wrench):  # type: ignore[no-untyped-def]
     """The ball, not of a rate, that a wrench (nw,) exceeds the farthest; -1 if it is within all."""
     found, worst = -1, 1.0
     for k in range(stacked.radius.shape[0]):
-        size = -1.0 if stacked.rate[k] else size_over(stacked, k, wrench)
+        size = -1.0 if stacked.rate[k] else size_over(stacked, k, wrench, wrench, 1.0)
         if size > worst:
             found, worst = k, size
     return found

@@ -11,7 +11,7 @@ import numpy as np
 from pivoting.controller.kernel import kernel, subroutine
 
 
-@subroutine
+@kernel
 def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, pull, vertices=None, facets=None):  # type: ignore[no-untyped-def]
     """The largest of four relative residuals: equilibrium, friction cones, dual cones, duality gap.
 
@@ -96,6 +96,3 @@ def _ratio(worst, size):  # type: ignore[no-untyped-def]
     if worst == 0.0 and size == 0.0:
         return 0.0
     return worst / size
-
-
-certified_residual = kernel(kkt_residual)  # called from Python

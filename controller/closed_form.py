@@ -7,7 +7,7 @@ f = (0, f_min) is in the cone whatever b is. This is erratum 6 of the notes: eli
 
 import numpy as np
 from pivoting.controller.certificate import kkt_residual
-from pivoting.controller.kernel import subroutine
+from pivoting.controller.kernel import kernel, subroutine
 from pivoting.controller.workspace import Reduced
 
 SMALL = 1e-15  # relative optimality at which a candidate is taken without looking at the others
@@ -114,7 +114,7 @@ def balancing_wrench(J, b, f, w):  # type: ignore[no-untyped-def]
         w[i] = s
 
 
-@subroutine
+@kernel
 def planar_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no-untyped-def]
     """The smallest wrench with one contact in the plane; see `contact_wrench`."""
     work = Reduced(*scratch)

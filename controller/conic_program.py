@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from pivoting.controller.block_matrix import Sparse
 from pivoting.controller.conic import CLARABEL, clarabel_solver
-from pivoting.controller.kernel import allocating, subroutine
+from pivoting.controller.kernel import kernel, subroutine
 from pivoting.controller.validate import Array, fail
 from scipy import sparse
 
@@ -233,13 +233,16 @@ def kkt_residual(program: ConicProgram, x: Array, z: Array) -> float:
     P, A, (zero, linear, orders) = program.P, program.A, program.cones
     sizes = np.array(orders, dtype=np.int64)
     matrices = P.data, P.indices, P.indptr, A.data, A.indices, A.indptr
-    return float(_residual(*matrices, program.q, program.b, zero, linear, sizes, x, z))
+    sums = np.zeros(len(x)), np.zeros(len(x)), program.b.copy(), np.zeros(len(z))
+    return float(_residual(*matrices, program.q, program.b, zero, linear, sizes, x, z, *sums))
 
 
-@allocating
-def _residual(P, P_row, P_column, A, A_row, A_column, q, b, zero, linear, orders, x, z):  # type: ignore[no-untyped-def]
+@kernel
+def _residual(  # type: ignore[no-untyped-def]
+    P, P_row, P_column, A, A_row, A_column, q, b, zero, linear, orders, x, z, curved, pull, s, terms
+):
+    """The same; P x, A'z, b - A x and |A||x| are summed up in the last four, which are 0, 0, b and 0."""
     n, m = q.shape[0], b.shape[0]
-    curved, pull, s, terms = np.zeros(n), np.zeros(n), b.copy(), np.zeros(m)
     for j in range(n):
         for k in range(P_column[j], P_column[j + 1]):
             i = P_row[k]
@@ -252,13 +255,21 @@ def _residual(P, P_row, P_column, A, A_row, A_column, q, b, zero, linear, orders
             s[i] -= A[k] * x[j]
             terms[i] += abs(A[k] * x[j])
     primal, dual = _outside(s, zero, linear, orders, False), _outside(z, zero, linear, orders, True)
-    primal /= max(1.0, np.abs(terms).max())
-    dual /= max(1.0, np.abs(z).max())
-    scale = max(1.0, np.abs(curved).max(), np.abs(q).max(), np.abs(pull).max())
-    stationary = np.abs(curved + q + pull).max() / scale
-    cost = 0.5 * abs((x * curved).sum()) + abs((q * x).sum())
-    gap = abs((s * z).sum()) / max(1.0, cost)
-    return max(primal, dual, stationary, gap) if np.isfinite(primal + dual + stationary + gap) else np.nan
+    largest_term = largest_z = scale = 1.0
+    stationary = curve = slope = gap = 0.0
+    for i in range(m):
+        largest_term, largest_z = max(largest_term, terms[i]), max(largest_z, abs(z[i]))
+        gap += s[i] * z[i]
+    for j in range(n):
+        scale = max(scale, max(abs(curved[j]), max(abs(q[j]), abs(pull[j]))))
+        stationary = max(stationary, abs(curved[j] + q[j] + pull[j]))
+        curve += x[j] * curved[j]
+        slope += q[j] * x[j]
+    primal, dual, stationary = primal / largest_term, dual / largest_z, stationary / scale
+    gap = abs(gap) / max(1.0, 0.5 * abs(curve) + abs(slope))
+    # comparisons with nan would hide it: what is not finite in x or z makes these sums so
+    finite = np.isfinite(curve + slope + gap + primal + dual)
+    return max(max(primal, dual), max(stationary, gap)) if finite else np.nan
 
 
 @subroutine
@@ -271,7 +282,8 @@ def _outside(s, zero, linear, orders, dual):  # type: ignore[no-untyped-def]
         elif not dual:
             worst = max(worst, abs(s[i]))
     first = zero + linear
-    for size in orders:
+    for k in range(orders.shape[0]):
+        size = orders[k]
         length = 0.0
         for i in range(first + 1, first + size):
             length += s[i] * s[i]

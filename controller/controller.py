@@ -10,11 +10,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.bounds import Stacked, begin_multiplier, farthest_exceeded, fill_heavier, next_multiplier, size_over
+from pivoting.controller.bounds import (
+    Stacked,
+    begin_multiplier,
+    farthest_exceeded,
+    fill_heavier,
+    next_multiplier,
+    size_over,
+)
 from pivoting.controller.closed_form import planar_wrench
 from pivoting.controller.contacts import Contact, fill_jacobian
 from pivoting.controller.interior_point import contact_wrench
-from pivoting.controller.kernel import kernel, subroutine
+from pivoting.controller.kernel import kernel
 from pivoting.controller.laws import Body, Law, fill_required
 from pivoting.controller.problem import WrenchProblem, wrench_weight
 from pivoting.controller.space import IDENTITY, Motion, Space, cross, fill_rotation, rotation_matrix, space
@@ -151,10 +158,8 @@ class WrenchController:
 
     def jacobian(self, orientation: Array) -> Array:
         """(nw, K d) contact Jacobian in object axes at an orientation (4,), object axes to world."""
-        R, J, still = np.empty((3, 3)), np.empty((len(self.Q_w), len(self.Q_f))), np.zeros(3)
-        q = np.array(orientation)
-        state_problem(self.belief, q, still, q, still, still, R, J, np.empty(len(self.Q_w)))
-        return J
+        still = np.zeros(3)
+        return self._stated((orientation, still), (orientation, still, still))[0]
 
     def problem(
         self, state: Motion, desired: Motion | None = None, *, external: ArrayLike | None = None
@@ -167,23 +172,29 @@ class WrenchController:
             external: (nw,) known wrench on the object besides gravity, contacts and the controller's own, such as that
                 of damped joints, about the CoM, object axes [N, N m].
         """
-        belief = self.belief
-        q, omega, _ = self.space.lift_motion(state)
         target = Motion(state.orientation) if desired is None else desired
-        q_d, omega_d, alpha_d = self.space.lift_motion(target)
-        R, J, required = np.empty((3, 3)), np.empty((len(self.Q_w), len(self.Q_f))), np.empty(len(self.Q_w))
-        state_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, required)
+        J, required = self._stated(self.space.lift_motion(state)[:2], self.space.lift_motion(target))
         if external is not None:
             required -= array("external", external, required.shape)
         return WrenchProblem(
             J,
             required,
             [contact.mu for contact in self.contacts],
-            f_min=belief.f_min,
+            f_min=self.belief.f_min,
             margin=self.margin,
             Q_w=self.Q_w,
             Q_f=self.Q_f,
         )
+
+    def _stated(self, measured: tuple[Array, ...], desired: tuple[Array, ...]) -> tuple[Array, Array]:
+        """J (nw, K d) and the required wrench (nw,) at q, omega for q_d, omega_d, alpha_d, all in world axes."""
+        J, required = np.empty((len(self.Q_w), len(self.Q_f))), np.empty(len(self.Q_w))
+        # read-only or not as in the loop: numba would compile everything again
+        seen, wanted = [np.array(values) for values in measured], [np.array(values) for values in desired]
+        for values in seen:
+            values.flags.writeable = False
+        state_problem(self.belief, *seen, *wanted, np.empty((3, 3)), J, required)
+        return J, required
 
 
 def _lifted_frame(contact: Contact, here: Space, table: Array) -> Array:
@@ -196,8 +207,8 @@ def _lifted_frame(contact: Contact, here: Space, table: Array) -> Array:
     return np.column_stack([t, np.cross(n, t), n])
 
 
-@subroutine
-def _fill_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ignore[no-untyped-def]
+@kernel
+def state_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ignore[no-untyped-def]
     """Write R (3, 3), J (nw, K d) and the required wrench b (nw,) at one state."""
     fill_rotation(q, R)
     fill_jacobian(R, belief.points, belief.offsets, belief.frames, belief.wrench_map, belief.force_map, J)
@@ -205,9 +216,6 @@ def _fill_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ig
         R, q, omega, q_d, omega_d, alpha_d, belief.law, belief.mass, belief.inertia, belief.gravity, belief.pivot,
         belief.offset, belief.wrench_map, b,
     )  # fmt: skip
-
-
-state_problem = kernel(_fill_problem)  # called from Python
 
 
 @kernel
@@ -220,7 +228,7 @@ def step_worlds(  # type: ignore[no-untyped-def]
     Args:
         belief: the values of `Belief`, shared by the worlds.
         bounds: the values of `WrenchBounds.stacked`, or None. One that is not on a rate is kept, as a heavier weight;
-            where that needs more than `HEAVIEST` times the weight, or a second bound, the answer is that without bounds.
+            where that needs more than `HEAVIEST` times the weight, or a second bound, the answer is that without any.
         own, planar, several: `WrenchController.workspace()`.
         tolerance: largest relative KKT residual of status 0 (solved).
         q: (W, 4) and omega: (W, 3), the measured orientations and angular velocities, world axes.
@@ -238,7 +246,7 @@ def step_worlds(  # type: ignore[no-untyped-def]
     Q_w, Q_f, mu, f_min = belief.Q_w, belief.Q_f, belief.mu, belief.f_min  # taken out once: it shows in the plane
     for i in range(q.shape[0]):
         j, b = i % q_d.shape[0], required[i]
-        _fill_problem(belief, q[i], omega[i], q_d[j], omega_d[j], alpha_d[j], R, J, b)
+        state_problem(belief, q[i], omega[i], q_d[j], omega_d[j], alpha_d[j], R, J, b)
         for row in range(nw):
             b[row] -= external[i % external.shape[0], row]
         ball, multiplier, Q = -1, 0.0, Q_w
@@ -259,7 +267,7 @@ def step_worlds(  # type: ignore[no-untyped-def]
                     begin_multiplier(Stacked(*bounds), ball, Q_w, root)
             if ball < 0 or not np.isfinite(residual[i]):
                 break
-            size = size_over(Stacked(*bounds), ball, wrench[i])
+            size = size_over(Stacked(*bounds), ball, wrench[i], wrench[i], 1.0)
             if abs(size - 1.0) <= HELD:
                 residual[i] = max(residual[i], abs(size - 1.0))
                 break

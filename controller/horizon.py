@@ -116,8 +116,8 @@ class Horizon:
         where, at = array("position", state.position, (3,)), unit_quaternions("orientation", state.orientation, (4,))
         velocity, omega = (array(name, getattr(state, name), (3,)) for name in ("velocity", "angular_velocity"))
         ahead = INTEGRATORS[self.integrator][1] == 2
-        path = Path(np.empty((1, 3)), np.empty((1, 4)), np.empty(7), np.empty(6))
-        fill_start(self.table, self._to_table, self._kept, self.h, ahead, where, at, velocity, omega, path)
+        path, R = Path(np.empty((1, 3)), np.empty((1, 4)), np.empty(7), np.empty(6)), np.empty((3, 3))
+        fill_start(self.table, self._to_table, self._kept, self.h, ahead, where, at, velocity, omega, R, path)
         self._refuse_off_plane("orientation", path.before[3:])
         return path
 

@@ -14,7 +14,7 @@ from pivoting.controller.horizon import Horizon
 from pivoting.controller.horizon_rows import Rows, defects, fill_corrected, fill_rows, fill_sides, fill_tracking
 from pivoting.controller.limits import friction_limits, wrench_limits
 from pivoting.controller.so3 import exponential
-from pivoting.controller.transcription import INTEGRATORS, Mechanics, Path
+from pivoting.controller.transcription import INTEGRATORS, Mechanics, Path, Scratch
 from pivoting.controller.validate import Array
 
 
@@ -35,7 +35,7 @@ class HorizonProgram:
         used, component = np.nonzero(belief.wrench_map)
         self._body = Mechanics(
             mass=belief.mass,
-            inertia=np.ascontiguousarray(belief.inertia),
+            inertia=np.array(belief.inertia),
             points=belief.points,
             pivot=belief.pivot,
             frames=np.ascontiguousarray(horizon.table.T @ belief.frames @ belief.force_map),
@@ -117,7 +117,7 @@ class HorizonProgram:
         fill_sides(rows, *self._tall, b)
         self._bounds.place(b, self._first, None if applied is None else applied / self._units.wrench)
         curvature, q = np.empty((N, nq, nq)), np.zeros((N, self._wide))
-        fill_tracking(self._body, self._Q, guess.path, *desired, curvature, q)
+        fill_tracking(self._body, self._Q, guess.path, *desired, Scratch.empty(), curvature, q)
         return ConicProgram(self._P.filled((curvature,)), q.ravel(), A, b, self.cones)
 
     def corrected(self, guess: Guess, x: Array) -> tuple[Guess, float]:
@@ -128,7 +128,7 @@ class HorizonProgram:
         N, path = self.horizon.steps, guess.path
         poses = path._replace(position=np.empty(path.position.shape), orientation=np.empty(path.orientation.shape))
         out = Guess(poses, np.empty(guess.wrench.shape), np.empty(guess.force.shape))
-        return out, fill_corrected(self._body, x.reshape(N, self._wide), guess, out)
+        return out, fill_corrected(self._body, x.reshape(N, self._wide), guess, Scratch.empty(), out)
 
     def defects(self, guess: Guess) -> tuple[float, float]:
         """How far a guess is from its own equations, not linearised: motion in weights, sticking in levers, radians."""
@@ -139,7 +139,8 @@ class HorizonProgram:
         applied = np.vdot(guess.wrench @ self._belief.Q_w, guess.wrench)
         pushed = np.vdot(guess.force @ self._belief.Q_f, guess.force)
         N, nq = self.horizon.steps, len(self._units.pose)
-        tracking = fill_tracking(self._body, self._Q, guess.path, *desired, np.empty((N, nq, nq)), np.empty((N, nq)))
+        out = np.empty((N, nq, nq)), np.empty((N, nq))
+        tracking = fill_tracking(self._body, self._Q, guess.path, *desired, Scratch.empty(), *out)
         return float(0.5 * (applied + pushed) + tracking * self._units.force**2)
 
     def _rows(self, guess: Guess) -> Rows:
@@ -147,7 +148,8 @@ class HorizonProgram:
         nq, n = guess.wrench.shape[1], guess.force.shape[1]
         rows = Rows.empty(horizon.steps, nq, n, self._sticking, len(self._clear))
         order, lag = INTEGRATORS[horizon.integrator]
-        fill_rows(self._body, order, lag, horizon.h, self._fixed, planar, self._clear, *guess, rows)
+        about = self._fixed, planar, self._clear, *guess
+        fill_rows(self._body, order, lag, horizon.h, *about, Scratch.empty(), rows)
         return rows
 
     def _generic(self) -> tuple[Rows, Array]:
@@ -164,7 +166,7 @@ class HorizonProgram:
         guess = Guess(path, rng.normal(size=(N, len(W))), rng.normal(size=(N, len(self._belief.Q_f))))
         wanted = np.ascontiguousarray(vectors[N + 1 : 2 * N + 1, :3]), turns[N + 1 : 2 * N + 1]
         curvature = np.empty((N, len(W), len(W)))
-        fill_tracking(self._body, self._Q, path, *wanted, curvature, np.empty((N, len(W))))
+        fill_tracking(self._body, self._Q, path, *wanted, Scratch.empty(), curvature, np.empty((N, len(W))))
         return self._rows(guess), curvature
 
 

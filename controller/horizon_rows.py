@@ -3,7 +3,7 @@
 from typing import NamedTuple, Self
 
 import numpy as np
-from pivoting.controller.kernel import allocating, kernel
+from pivoting.controller.kernel import kernel, subroutine
 from pivoting.controller.so3 import fill_difference_jacobians, turn
 from pivoting.controller.space import cross, fill_rotation, into, rotation_error
 from pivoting.controller.transcription import Motion, fill_motion
@@ -29,14 +29,14 @@ class Rows(NamedTuple):
         return cls(motion, np.empty((N, S, nq)), np.empty((N, S)), np.empty((N, P, nq)), np.empty((N, P)))
 
 
-@allocating
-def fill_rows(body, order, lag, h, fixed, planar, clear, path, wrench, force, rows):  # type: ignore[no-untyped-def]
+@kernel
+def fill_rows(body, order, lag, h, fixed, planar, clear, path, wrench, force, scratch, rows):  # type: ignore[no-untyped-def]
     """Write all of them about a path, wrenches (N, nw) and forces (N, K d) [N, N m]; those without a row are left."""
-    fill_motion(body, order, lag, h, path, wrench, force, rows.motion)
+    fill_motion(body, order, lag, h, path, wrench, force, scratch, rows.motion)
     if rows.off.shape[1]:
-        fill_sticking(body, fixed, planar, path, rows.sticking, rows.off)
+        fill_sticking(body, fixed, planar, path, scratch, rows.sticking, rows.off)
     if rows.room.shape[1]:
-        fill_clearance(body, clear, path, rows.clearance, rows.room)
+        fill_clearance(body, clear, path, scratch, rows.clearance, rows.room)
 
 
 @kernel
@@ -78,18 +78,22 @@ def defects(rows, units, wrench, force):  # type: ignore[no-untyped-def]
     return moved, off
 
 
-@allocating
-def fill_corrected(body, x, guess, out):  # type: ignore[no-untyped-def]
+@kernel
+def fill_corrected(body, x, guess, scratch, out):  # type: ignore[no-untyped-def]
     """Write the guess that an answer x (N, 2 nq + K d) makes of a guess, and return the greatest change, in units."""
     nq, n, units, change = guess.wrench.shape[1], guess.force.shape[1], body.units, 0.0
-    moved = np.empty(6)
-    out.path.position[0], out.path.orientation[0] = guess.path.position[0], guess.path.orientation[0]
+    moved = scratch.poses[0]
+    for i in range(3):
+        out.path.position[0, i] = guess.path.position[0, i]
+    for i in range(4):
+        out.path.orientation[0, i] = guess.path.orientation[0, i]
     for t in range(x.shape[0]):
-        moved[:] = 0.0
+        for i in range(6):
+            moved[i] = 0.0
         for c in range(nq):
             moved[body.pick[c]] = body.sign[c] * x[t, c] * units.pose[c]
             out.wrench[t, c] = x[t, nq + c] * units.wrench[c]
-            change = max(change, abs(x[t, c]), abs(x[t, nq + c] - guess.wrench[t, c] / units.wrench[c]))
+            change = max(change, max(abs(x[t, c]), abs(x[t, nq + c] - guess.wrench[t, c] / units.wrench[c])))
         for c in range(n):
             out.force[t, c] = x[t, 2 * nq + c] * units.force
             change = max(change, abs(x[t, 2 * nq + c] - guess.force[t, c] / units.force))
@@ -99,8 +103,8 @@ def fill_corrected(body, x, guess, out):  # type: ignore[no-untyped-def]
     return change
 
 
-@allocating
-def fill_sticking(body, fixed, planar, path, rows, side):  # type: ignore[no-untyped-def]
+@subroutine
+def fill_sticking(body, fixed, planar, path, scratch, rows, side):  # type: ignore[no-untyped-def]
     """Write rows (N, S, nq) and sides (N, S): rows d_t = side keeps the contacts where they were at the start.
 
     Args:
@@ -108,10 +112,10 @@ def fill_sticking(body, fixed, planar, path, rows, side):  # type: ignore[no-unt
         fixed: (D, 2, 3) pairs (u, e) of object axes: e, where it pointed at the start, does not turn towards u.
         planar: whether the motion is in the plane, and so the middle row of three for the contacts' mean is left out.
     """
-    R, R_0 = np.empty((3, 3)), np.empty((3, 3))
+    R, R_0 = scratch.turns[0], scratch.turns[1]
     fill_rotation(path.before[3:], R_0)
     nw, p, length, pose = body.pick.shape[0], body.pivot, body.units.length, body.units.pose
-    full, there = np.empty(6), np.empty(3)
+    full, there = scratch.poses[0], scratch.poses[1]
     for i in range(3):
         there[i] = path.before[i] + R_0[i, 0] * p[0] + R_0[i, 1] * p[1] + R_0[i, 2] * p[2]
     for t in range(rows.shape[0]):
@@ -120,7 +124,7 @@ def fill_sticking(body, fixed, planar, path, rows, side):  # type: ignore[no-unt
         for i in range(3):
             if planar and i == 1:
                 continue
-            full[:3] = 0.0
+            full[0] = full[1] = full[2] = 0.0
             full[i] = 1.0
             # e_i . R (d x p) = (p x R'e_i) . d
             full[3], full[4], full[5] = cross(p[0], p[1], p[2], R[i, 0], R[i, 1], R[i, 2])
@@ -135,7 +139,7 @@ def fill_sticking(body, fixed, planar, path, rows, side):  # type: ignore[no-unt
             w1 = R_0[1, 0] * e[0] + R_0[1, 1] * e[1] + R_0[1, 2] * e[2]
             w2 = R_0[2, 0] * e[0] + R_0[2, 1] * e[1] + R_0[2, 2] * e[2]
             s0, s1, s2 = into(R, w0, w1, w2)
-            full[:3] = 0.0
+            full[0] = full[1] = full[2] = 0.0
             full[3], full[4], full[5] = cross(u[0], u[1], u[2], s0, s1, s2)  # u . (s x d)
             for c in range(nw):
                 rows[t, row, c] = body.sign[c] * pose[c] * full[body.pick[c]]
@@ -143,21 +147,20 @@ def fill_sticking(body, fixed, planar, path, rows, side):  # type: ignore[no-unt
             row += 1
 
 
-@allocating
-def fill_clearance(body, clear, path, rows, side):  # type: ignore[no-untyped-def]
+@subroutine
+def fill_clearance(body, clear, path, scratch, rows, side):  # type: ignore[no-untyped-def]
     """Write rows (N, P, nq) and sides (N, P): rows d_t <= side keeps points above the lowest contact of the start.
 
     Args:
         body: `Mechanics`.  clear: (P, 3) from the CoM, object axes [m].
     """
     length, pose = body.units.length, body.units.pose
-    R = np.empty((3, 3))
+    R, full = scratch.turns[0], scratch.poses[0]
     fill_rotation(path.before[3:], R)
     floor = np.inf
     for k in range(body.points.shape[0]):
         p = body.points[k]
         floor = min(floor, path.before[2] + R[2, 0] * p[0] + R[2, 1] * p[1] + R[2, 2] * p[2])
-    full = np.empty(6)
     for t in range(rows.shape[0]):
         fill_rotation(path.orientation[t + 1], R)
         for k in range(clear.shape[0]):
@@ -171,8 +174,8 @@ def fill_clearance(body, clear, path, rows, side):  # type: ignore[no-untyped-de
             side[t, k] = height / length
 
 
-@allocating
-def fill_tracking(body, Q, path, position, orientation, curvature, slope):  # type: ignore[no-untyped-def]
+@kernel
+def fill_tracking(body, Q, path, position, orientation, scratch, curvature, slope):  # type: ignore[no-untyped-def]
     """Write what 1/2 e'Q e is to second order in d_t, e the errors from a path's poses to desired ones.
 
     Args:
@@ -184,16 +187,20 @@ def fill_tracking(body, Q, path, position, orientation, curvature, slope):  # ty
         The sum of 1/2 e'Q e, over that square.
     """
     cost, nw = 0.0, body.pick.shape[0]
-    full, X = np.empty(6), np.zeros((6, 6))
-    J, QJ, error = np.empty((nw, nw)), np.empty((nw, nw)), np.empty(nw)
-    unused = np.empty((3, 3))
-    for i in range(3):
-        X[i, i] = -1.0
+    full, error = scratch.poses[0], scratch.poses[1]
+    X, J, QJ = scratch.blocks[0], scratch.blocks[1], scratch.blocks[2]
+    end, start = scratch.turns[0], scratch.turns[1]
+    for i in range(6):
+        for j in range(6):
+            X[i, j] = -1.0 if i == j else 0.0
     for t in range(position.shape[0]):
         for i in range(3):
             full[i] = position[t, i] - path.position[t + 1, i]
         full[3], full[4], full[5] = rotation_error(path.orientation[t + 1], orientation[t])
-        fill_difference_jacobians(full[3:], unused, X[3:, 3:])
+        fill_difference_jacobians(full[3:], end, start)
+        for i in range(3):
+            for j in range(3):
+                X[3 + i, 3 + j] = start[i, j]
         for r in range(nw):
             error[r] = body.sign[r] * full[body.pick[r]]
             for c in range(nw):

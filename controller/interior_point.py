@@ -9,10 +9,11 @@ import numpy as np
 from pivoting.controller.certificate import kkt_residual
 from pivoting.controller.closed_form import balancing_wrench, reduce
 from pivoting.controller.dense import factor, solve_factored
-from pivoting.controller.kernel import subroutine
+from pivoting.controller.kernel import kernel, subroutine
 from pivoting.controller.polish import gradient, polish, release
+from pivoting.controller.scaling import correct, predict
 from pivoting.controller.spatial_form import APEX, EDGE, FLOOR, INSIDE, RIM, spatial_force
-from pivoting.controller.workspace import Work
+from pivoting.controller.workspace import DQ, P, Q, Work
 
 ITERATIONS = 60  # bound; 6 to 12 are usual
 GUESSES = 3  # polishes of one iterate, each on the pieces that the one before asked for
@@ -20,10 +21,8 @@ FIRST_GOAL = 1e-3  # relative gap at which the pieces are guessed for the first 
 SPREAD = 0.1  # least height of the start above the floors, relative to the largest force
 EXACT = 1e-13  # relative KKT residual at which nothing is left to improve
 
-P, Q, DP, DQ, C = 0, 1, 2, 3, 4  # columns of `Work.floor`
 
-
-@subroutine
+@kernel
 def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no-untyped-def]
     """Write the optimal contact forces f (n,) and wrench w (nw,), and return their relative KKT residual.
 
@@ -35,64 +34,45 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no
         scratch: the values of a `Work`, see `workspace`.
     """
     work, n, K = Work(*scratch), f.shape[0], mu.shape[0]
-    best = np.inf
-    H, h, M, x, g, now = work.H, work.h, work.M, work.x, work.g, work.now
-    size = reduce(J, b, Q_w, Q_f, H, h, x)
+    axes, h, now, best = work.axes, work.h, work.now, np.inf
+    size = reduce(J, b, Q_w, Q_f, work.H, h, work.x)
     for i in range(K):
         size += mu[i] + f_min[i]
     if not np.isfinite(size):
         for i in range(n):
             f[i] = np.nan
-        balancing_wrench(J, b, f, w)
+        for i in range(w.shape[0]):
+            w[i] = np.nan
         return np.nan
     if n == 3:  # exact up to eps cond(H): most problems need no more
-        work.piece[0] = spatial_force(H, h, mu[0], f_min[0], f)
-        balancing_wrench(J, b, f, w)
-        best = kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, work.pull)
+        best = _closed_form(J, b, Q_w, Q_f, mu, f_min, f, w, work)
+        if best > EXACT:
+            best = _try(J, b, Q_w, Q_f, mu, f_min, axes, 1, f, w, best, work)
         if best <= EXACT:
             return best
-        for i in range(n):
-            now[i] = f[i]
-        best = _try(J, b, Q_w, Q_f, mu, f_min, work.axes, 1, f, w, best, work)
-        if best <= EXACT:
-            return best
-    if _nothing_pulls(h, mu, f_min, work.axes):  # f = 0 is optimal, exactly
+    if _nothing_pulls(h, mu, f_min, axes):  # f = 0 is optimal, exactly
         for i in range(n):
             now[i] = 0.0
-        return _try(J, b, Q_w, Q_f, mu, f_min, work.axes, 0, f, w, best, work)
-    for i in range(n):
-        now[i] = h[i]
-        for j in range(n):
-            M[i, j] = H[i, j]
-    factor(M, n)
-    solve_factored(M, now, n)
-    if _inside(mu, f_min, work.axes, now):
+        return _try(J, b, Q_w, Q_f, mu, f_min, axes, 0, f, w, best, work)
+    _free_minimum(work.H, h, work)
+    if _inside(mu, f_min, axes, now):
         for i in range(K):
             work.piece[i] = INSIDE
-        best = _try(J, b, Q_w, Q_f, mu, f_min, work.axes, GUESSES, f, w, best, work)
+        best = _try(J, b, Q_w, Q_f, mu, f_min, axes, GUESSES, f, w, best, work)
         if best <= EXACT:
             return best
-    cones = _start(H, h, mu, f_min, work.axes, work)
+    cones, gap, left, size = _start(mu, f_min, axes, work)
     goal, least = FIRST_GOAL, np.inf
     for _ in range(ITERATIONS):
-        gap, left, size = _measure(mu, f_min, work.axes, work)
         if not gap + left < np.inf:
             break
         if gap + left <= goal * size:
             _guess(mu, f_min, work)
-            best = _try(J, b, Q_w, Q_f, mu, f_min, work.axes, GUESSES, f, w, best, work)
+            best = _try(J, b, Q_w, Q_f, mu, f_min, axes, GUESSES, f, w, best, work)
             if best <= EXACT or goal < 1e-13:
                 break
             goal *= 1e-2
-        for i in range(n):
-            for j in range(i, n):
-                M[i, j] = H[i, j]
-        _scale(mu, f_min, work.axes, work)
-        factor(M, n)
-        for i in range(n):
-            x[i] = -g[i]
-        solve_factored(M, x, n)
-        alpha = min(1.0, _step_length(mu, f_min, work.axes, False, work))
+        alpha = predict(mu, f_min, axes, work)
         # Mehrotra's rule alone can cycle: the second-order term is only as good as the predictor is long (Colombo and
         # Gondzio 2008), and without progress one step is taken towards the central path instead. The gap must not run
         # ahead of the dual residual either, or the iterates end at a boundary far from the optimum.
@@ -100,21 +80,28 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no
         if gap + left > 0.9 * least:
             sigma, second = max(sigma, 0.5), 0.0
         least = min(least, gap + left)
-        _correct(mu, f_min, work.axes, sigma * max(gap, left) / cones, second, work)
-        solve_factored(M, x, n)
-        alpha = 0.99 * _step_length(mu, f_min, work.axes, True, work)
+        alpha = correct(mu, f_min, axes, sigma * max(gap, left) / cones, second, work)
         if alpha <= 1e-12:
             break
-        _advance(f_min, min(1.0, alpha), work)
+        gap, left, size = _advance(mu, f_min, axes, alpha, work)
     if best > EXACT:
-        best = _try(J, b, Q_w, Q_f, mu, f_min, work.axes, 0, f, w, best, work)
+        best = _try(J, b, Q_w, Q_f, mu, f_min, axes, 0, f, w, best, work)
     return best
+
+
+@subroutine
+def _closed_form(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-untyped-def]
+    """One contact in space: its optimum, which is also the iterate, its piece, and its certificate."""
+    work.piece[0] = spatial_force(work.H, work.h, mu[0], f_min[0], f)
+    balancing_wrench(J, b, f, w)
+    for i in range(3):
+        work.now[i] = f[i]
+    return kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, work.pull)
 
 
 @subroutine
 def _try(J, b, Q_w, Q_f, mu, f_min, axes, polishes, f, w, best, work):  # type: ignore[no-untyped-def]
     """Polish the iterate, or with no polishes take it as it is; keep it in f and w if its certificate is better."""
-    dim = len(axes)
     trial_f, trial_w = work.trial_f, work.trial_w
     for _ in range(max(polishes, 1)):
         for i in range(f.shape[0]):
@@ -150,6 +137,18 @@ def _nothing_pulls(h, mu, f_min, axes):  # type: ignore[no-untyped-def]
 
 
 @subroutine
+def _free_minimum(H, h, work):  # type: ignore[no-untyped-def]
+    """The minimum without cones, into the iterate."""
+    n = h.shape[0]
+    for i in range(n):
+        work.now[i] = h[i]
+        for j in range(i, n):
+            work.M[i, j] = H[i, j]
+    factor(work.M, n)
+    solve_factored(work.M, work.now, n)
+
+
+@subroutine
 def _inside(mu, f_min, axes, f):  # type: ignore[no-untyped-def]
     """Is every force (n,) in its truncated cone?"""
     dim = len(axes)
@@ -162,10 +161,10 @@ def _inside(mu, f_min, axes, f):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def _start(H, h, mu, f_min, axes, work):  # type: ignore[no-untyped-def]
+def _start(mu, f_min, axes, work):  # type: ignore[no-untyped-def]
     """From the free minimum in `now` to a strictly feasible start with multipliers on the central path's scale.
 
-    Returns the number of cones.
+    Returns the number of cones, and what `_measure` does.
     """
     dim = len(axes)
     K = mu.shape[0]
@@ -200,7 +199,8 @@ def _start(H, h, mu, f_min, axes, work):  # type: ignore[no-untyped-def]
         y[i, 0], y[i, 1], y[i, 2] = scale * s[i, 0], -scale * s[i, 1], -scale * s[i, 2]
         if f_min[i] > 0.0:
             floor[i, Q] = level / floor[i, P]
-    return cones
+    gap, left, size = _measure(mu, f_min, axes, work)
+    return cones, gap, left, size
 
 
 @subroutine
@@ -253,133 +253,8 @@ def _guess(mu, f_min, work):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def _determinant(v0, v1, v2):  # type: ignore[no-untyped-def]
-    """v_0^2 - |v_1|^2 without the cancellation of the squares."""
-    size = np.sqrt(v1 * v1 + v2 * v2)
-    return (v0 - size) * (v0 + size)
-
-
-@subroutine
-def _unscale(b0, b1, b2, eta, v0, v1, v2):  # type: ignore[no-untyped-def]
-    """W^-1 v for the scaling point b."""
-    dot = b1 * v1 + b2 * v2
-    slope = dot / (1.0 + b0) - v0
-    inverse = 1.0 / eta
-    return (b0 * v0 - dot) * inverse, (v1 + slope * b1) * inverse, (v2 + slope * b2) * inverse
-
-
-@subroutine
-def _scale(mu, f_min, axes, work):  # type: ignore[no-untyped-def]
-    """The Nesterov-Todd scaling W y = W^-1 s = lam of every cone, and M += A'W^-2 A block by block.
-
-    W^2 = eta^2 (2 b b' - diag(1, -1, -1)), so W^-2 = (2 v v' - diag(1, -1, -1)) / eta^2 with v = (b_0, -b_1, -b_2).
-    """
-    dim = len(axes)
-    M, s, y, bar, lam, floor = work.M, work.s, work.y, work.bar, work.lam, work.floor
-    for i in range(mu.shape[0]):
-        s0, s1, s2, y0, y1, y2 = s[i, 0], s[i, 1], s[i, 2], y[i, 0], y[i, 1], y[i, 2]
-        size_s, size_y = np.sqrt(_determinant(s0, s1, s2)), np.sqrt(_determinant(y0, y1, y2))
-        eta2 = size_s / size_y
-        # (s / size_s + J y / size_y) / (2 gamma)
-        half = 0.5 / np.sqrt(0.5 + 0.5 * (s0 * y0 + s1 * y1 + s2 * y2) / (size_s * size_y))
-        in_s, in_y = half / size_s, half / size_y
-        b0, b1, b2 = s0 * in_s + y0 * in_y, s1 * in_s - y1 * in_y, s2 * in_s - y2 * in_y
-        eta = np.sqrt(eta2)
-        l0, l1, l2 = _unscale(b0, b1, b2, eta, s0, s1, s2)
-        bar[i, 0], bar[i, 1], bar[i, 2], bar[i, 3] = b0, b1, b2, eta
-        lam[i, 0], lam[i, 1], lam[i, 2], lam[i, 3] = l0, l1, l2, size_s * size_y
-        t, e = i * dim, (i + 1) * dim - 1
-        scale = 1.0 / eta2
-        head, double = mu[i] * b0, 2.0 * scale
-        M[t, t] += scale + double * b1 * b1
-        M[t, e] -= double * b1 * head
-        if dim == 3:
-            M[t, t + 1] += double * b1 * b2
-            M[t + 1, t + 1] += scale + double * b2 * b2
-            M[t + 1, e] -= double * b2 * head
-        M[e, e] += double * head * head - scale * mu[i] * mu[i]
-        if f_min[i] > 0.0:
-            M[e, e] += floor[i, Q] / floor[i, P]
-
-
-@subroutine
-def _step_length(mu, f_min, axes, corrected, work):  # type: ignore[no-untyped-def]
-    """The steps that belong to the step x of f, and how far (<= 2) they may be followed to the first boundary.
-
-    u = W^-1 ds and W dy = c - lam - u, with c = 0 in the predictor, whose length is only a measure and is taken in the
-    scaled cones; the corrector's is taken in the cones themselves and dy is written into c.
-    """
-    dim = len(axes)
-    x, s, y, bar, lam, u, c, floor = work.x, work.s, work.y, work.bar, work.lam, work.u, work.c, work.floor
-    alpha = 2.0
-    for i in range(mu.shape[0]):
-        t, e = i * dim, (i + 1) * dim - 1
-        s0, s1, s2 = mu[i] * x[e], x[t], x[t + 1] if dim == 3 else 0.0
-        u0, u1, u2 = _unscale(bar[i, 0], bar[i, 1], bar[i, 2], bar[i, 3], s0, s1, s2)
-        l0, l1, l2 = lam[i, 0], lam[i, 1], lam[i, 2]
-        if corrected:
-            y0, y1, y2 = _unscale(bar[i, 0], bar[i, 1], bar[i, 2], bar[i, 3], c[i, 0] - u0, c[i, 1] - u1, c[i, 2] - u2)
-            y0, y1, y2 = y0 - y[i, 0], y1 - y[i, 1], y2 - y[i, 2]  # W^-1 lam = y: take it exactly
-            c[i, 0], c[i, 1], c[i, 2] = y0, y1, y2
-            alpha = min(alpha, _reach(s[i, 0], s[i, 1], s[i, 2], s0, s1, s2))
-            alpha = min(alpha, _reach(y[i, 0], y[i, 1], y[i, 2], y0, y1, y2))
-        else:
-            u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
-            alpha = min(alpha, _reach(l0, l1, l2, u0, u1, u2))
-            alpha = min(alpha, _reach(l0, l1, l2, -l0 - u0, -l1 - u1, -l2 - u2))
-        if f_min[i] > 0.0:
-            dp = x[e]
-            dq = -floor[i, Q] * (1.0 + dp / floor[i, P])
-            if corrected:
-                dq += floor[i, C]
-            floor[i, DP], floor[i, DQ] = dp, dq
-            if dp < 0.0:
-                alpha = min(alpha, -floor[i, P] / dp)
-            if dq < 0.0:
-                alpha = min(alpha, -floor[i, Q] / dq)
-    return alpha
-
-
-@subroutine
-def _reach(v0, v1, v2, d0, d1, d2):  # type: ignore[no-untyped-def]
-    """The largest t <= 2 with v + t d in the second-order cone, v inside: the first root of a quadratic."""
-    inside = _determinant(v0, v1, v2)
-    half = v0 * d0 - v1 * d1 - v2 * d2
-    root = half * half - _determinant(d0, d1, d2) * inside
-    if root < 0.0:
-        return 2.0
-    slope = np.sqrt(root) - half
-    return inside / slope if slope > 0.5 * inside else 2.0
-
-
-@subroutine
-def _correct(mu, f_min, axes, target, second, work):  # type: ignore[no-untyped-def]
-    r"""From the predictor's steps: c = lam \ (target e - second (W^-1 ds) o (W dy)), and x = -g + A'W^-1 c."""
-    dim = len(axes)
-    x, g, u, lam, c, bar, floor = work.x, work.g, work.u, work.lam, work.c, work.bar, work.floor
-    for i in range(mu.shape[0]):
-        t, e = i * dim, (i + 1) * dim - 1
-        l0, l1, l2 = lam[i, 0], lam[i, 1], lam[i, 2]
-        u0, u1, u2 = u[i, 0], u[i, 1], u[i, 2]
-        v0, v1, v2 = -l0 - u0, -l1 - u1, -l2 - u2
-        d0 = target - second * (u0 * v0 + u1 * v1 + u2 * v2)
-        d1, d2 = -second * (u0 * v1 + v0 * u1), -second * (u0 * v2 + v0 * u2)
-        c0 = (l0 * d0 - l1 * d1 - l2 * d2) / lam[i, 3]
-        inverse = 1.0 / l0
-        c1, c2 = (d1 - c0 * l1) * inverse, (d2 - c0 * l2) * inverse
-        c[i, 0], c[i, 1], c[i, 2] = c0, c1, c2
-        c0, c1, c2 = _unscale(bar[i, 0], bar[i, 1], bar[i, 2], bar[i, 3], c0, c1, c2)
-        x[e], x[t] = mu[i] * c0 - g[e], c1 - g[t]
-        if dim == 3:
-            x[t + 1] = c2 - g[t + 1]
-        if f_min[i] > 0.0:
-            floor[i, C] = (target - second * floor[i, DP] * floor[i, DQ]) / floor[i, P]
-            x[e] += floor[i, C]
-
-
-@subroutine
-def _advance(f_min, alpha, work):  # type: ignore[no-untyped-def]
-    """Follow the step: f, and the multipliers; the slacks are functions of f."""
+def _advance(mu, f_min, axes, alpha, work):  # type: ignore[no-untyped-def]
+    """Follow the step: f, and the multipliers; the slacks are functions of f. Returns what `_measure` does."""
     for i in range(work.x.shape[0]):
         work.now[i] += alpha * work.x[i]
     for i in range(f_min.shape[0]):
@@ -387,3 +262,4 @@ def _advance(f_min, alpha, work):  # type: ignore[no-untyped-def]
             work.y[i, a] += alpha * work.c[i, a]
         if f_min[i] > 0.0:
             work.floor[i, Q] += alpha * work.floor[i, DQ]
+    return _measure(mu, f_min, axes, work)

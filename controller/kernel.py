@@ -1,7 +1,10 @@
-"""How compiled functions are compiled: cached on disk, divisions by zero as in NumPy, inlined or not.
+"""How functions are compiled: `kernel`, which Python calls, and `subroutine`, which only kernels call.
 
-Numba hands the option `forceinline` on to whatever is compiled along the way, so that it is always said: with all
-of the interior point inlined into itself, compilation takes minutes.
+Compiling is what a new user waits for, and most of it is numba's own work in Python and the code of callees, which is
+optimised again in each caller. So kernels neither allocate nor count references (scratch is handed in, and no array is
+returned), subroutines have no entry from Python and are compiled only once, arrays are copied in loops (an assignment
+of slices brings the code of its error message along, with text and lists), all arrays are contiguous, and what a
+problem does not need is None, whose branches are left out.
 """
 
 from collections.abc import Callable
@@ -24,16 +27,12 @@ def _cache_folder() -> Path | None:
 CACHE = _cache_folder()
 CACHED = CACHE is not None
 
-_ours: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
-_inside = {**_ours, "_nrt": False, "no_cpython_wrapper": True}
+_common: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
 
-kernel = njit(cache=CACHED, forceinline=False, _nrt=False, **_ours)
-allocating = njit(cache=CACHED, forceinline=False, **_ours)
-subroutine = register_jitable(forceinline=False, **_inside)
-inlined = register_jitable(forceinline=True, **_inside)
+kernel = njit(cache=CACHED, **_common)
+subroutine = register_jitable(no_cpython_wrapper=True, **_common)
 
 
 def elementwise(layout: str) -> Callable[..., Any]:
     """A decorator: two float arrays and an output, broadcast over all axes but those that `layout` names."""
     return guvectorize(["void(f8[:], f8[:], f8[:])"], layout, cache=CACHED)
-

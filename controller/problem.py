@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.certificate import certified_residual
+from pivoting.controller.certificate import kkt_residual
 from pivoting.controller.polygon import Polygon, polygon
 from pivoting.controller.validate import Array, array, fail, number, positive_definite
 
@@ -112,13 +112,9 @@ class WrenchProblem:
         With `edges` > 0 that of the program whose cones in space are replaced by inscribed pyramids.
         """
         w, f = np.array(wrench, dtype=float), np.array(force, dtype=float).ravel()
-        shape = self._pyramid(edges) if edges else (None, None)
-        return float(
-            certified_residual(
-                self.jacobian, self.required, self.Q_w, self.Q_f, self.mu_planned, self.f_min, w, f,
-                np.empty((2, w.size)), *shape,
-            )  # fmt: skip
-        )
+        stated = self.jacobian, self.required, self.Q_w, self.Q_f, self.mu_planned, self.f_min
+        shape = self._pyramid(edges) if edges else ()
+        return float(kkt_residual(*stated, w, f, np.empty((2, w.size)), *shape))
 
     def _pyramid(self, edges: int) -> Polygon:
         if self.dim != 3:

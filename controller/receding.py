@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from pivoting.controller.horizon import BodyState
-from pivoting.controller.kernel import allocating
+from pivoting.controller.kernel import kernel
 from pivoting.controller.plan import Plan, Planner
 from pivoting.controller.so3 import turn
 from pivoting.controller.space import fill_rotation, into, quaternion_product
@@ -109,19 +109,31 @@ def followed_motion(followed: Followed, state: BodyState, times: Array) -> tuple
     begun = quaternion_product(plan.horizon.controller.base, plan.guess.path.before[3:])
     accelerated = INTEGRATORS[plan.horizon.integrator][0] == 2
     out = np.empty((len(times), 4)), np.empty((len(times), 3)), np.empty((len(times), 3))
-    _follow(begun, plan.angular_velocity, accelerated, plan.horizon.h, followed.since + times, *out)
+    _follow(
+        begun,
+        plan.angular_velocity,
+        accelerated,
+        plan.horizon.h,
+        followed.since + times,
+        np.empty((3, 3)),
+        np.empty(3),
+        *out,
+    )
     return out
 
 
-@allocating
-def _follow(begun, rates, accelerated, h, times, orientation, rate, acceleration):  # type: ignore[no-untyped-def]
-    """Write the motion (T, 4), (T, 3), (T, 3) from `begun` (4,), with rates (N + 1, 3) in world axes every h [s]."""
-    N, R = rates.shape[0] - 1, np.empty((3, 3))
-    turning = np.empty(3)
+@kernel
+def _follow(begun, rates, accelerated, h, times, R, turning, orientation, rate, acceleration):  # type: ignore[no-untyped-def]
+    """Write the motion (T, 4), (T, 3), (T, 3) from `begun` (4,), with rates (N + 1, 3) in world axes every h [s].
+
+    R: (3, 3) and turning: (3,) are scratch.
+    """
+    N = rates.shape[0] - 1
     for i in range(times.shape[0]):
         at = min(max(times[i], 0.0), N * h)
         last = min(int(at / h + 1e-9), N - 1)
-        orientation[i] = begun
+        for j in range(4):
+            orientation[i, j] = begun[j]
         for step in range(last + 1):
             tau = h if step < last else at - last * h
             begin = rates[step] if accelerated else rates[step + 1]

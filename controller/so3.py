@@ -53,11 +53,11 @@ def fill_hat(x, y, z, out):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def add_product(scale, A, B, out):  # type: ignore[no-untyped-def]
-    """out += scale A B, all (3, 3)."""
+def add_product(scale, A, B, out, row, column):  # type: ignore[no-untyped-def]
+    """Add scale A B, (3, 3), to the block of out that begins at this row and column."""
     for i in range(3):
         for j in range(3):
-            out[i, j] += scale * (A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j])
+            out[row + i, column + j] += scale * (A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j])
 
 
 @subroutine

@@ -13,7 +13,6 @@ import numpy as np
 from pivoting.controller.closed_form import planar_wrench
 from pivoting.controller.conic import CLARABEL, Answer, clarabel_answer, scaled, split
 from pivoting.controller.interior_point import contact_wrench
-from pivoting.controller.kernel import kernel
 from pivoting.controller.problem import WrenchProblem
 from pivoting.controller.solution import INSCRIBED, STATUS, TOLERANCE, Solution, SolveError, certified
 from pivoting.controller.validate import fail, number
@@ -84,9 +83,7 @@ def methods() -> tuple[str, ...]:
     return ("closed-form", "clarabel", *(f"qp:{name}" for name in sorted(_installed()) if _answers(name)))
 
 
-solve_planar, solve_contacts = kernel(planar_wrench), kernel(contact_wrench)
 Options = dict[str, Any]
-solve_planar, solve_contacts = kernel(planar_wrench), kernel(contact_wrench)
 
 
 def _edges(problem: WrenchProblem, method: str, options: Options) -> int:
@@ -165,9 +162,9 @@ def _compiled(problem: WrenchProblem, options: Options, edges: int) -> Answer:
     cones = np.array(problem.mu_planned), np.array(problem.f_min)
     planar, several = workspace(nw, problem.contacts, problem.dim)
     if planar is not None:
-        solve_planar(*stated, *cones, f, w, planar)
+        planar_wrench(*stated, *cones, f, w, planar)
     else:
-        solve_contacts(*stated, *cones, f, w, several)
+        contact_wrench(*stated, *cones, f, w, several)
     return w, f, "compiled kernel"
 
 

@@ -127,7 +127,7 @@ def quaternion_product(p, q, out):  # type: ignore[no-untyped-def]
     fill_product(p, q, out)
 
 
-@subroutine
+@kernel
 def fill_rotation(q, out):  # type: ignore[no-untyped-def]
     """Write the rotation matrix (3, 3) of quaternion q (4,) into out; q need not be exactly of unit length."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -181,11 +181,8 @@ def rotation_error(q, q_d):  # type: ignore[no-untyped-def]
     return scale * x, scale * y, scale * z
 
 
-_rotation = kernel(fill_rotation)  # called from Python
-
-
 def rotation_matrix(quaternion: Array) -> Array:
     """(3, 3) rotation matrix of one quaternion (4,)."""
     out = np.empty((3, 3))
-    _rotation(np.ascontiguousarray(quaternion, dtype=float), out)
+    fill_rotation(np.ascontiguousarray(quaternion, dtype=float), out)
     return out

@@ -12,11 +12,11 @@ differences on the left, `lag` the poses between the one that is reached and the
 are y / h, so that they are no variables; omega is that of y_{t-1}, and c = 0 for order 1.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from pivoting.controller.block_matrix import Indices
-from pivoting.controller.kernel import allocating
+from pivoting.controller.kernel import kernel, subroutine
 from pivoting.controller.so3 import add_product, fill_difference_jacobians, fill_hat, turn
 from pivoting.controller.space import cross, fill_product, fill_rotation, into, rotation_error
 from pivoting.controller.units import Units
@@ -70,14 +70,27 @@ class Motion(NamedTuple):
     by_force: Array
 
 
-@allocating
-def fill_start(table, to_table, kept, h, ahead, position, orientation, velocity, omega, out):  # type: ignore[no-untyped-def]
+class Scratch(NamedTuple):
+    """Of the rows of a horizon. turns: (8, 3, 3).  poses: (5, 6).  blocks: (6, 6, 6)."""
+
+    turns: Array
+    poses: Array
+    blocks: Array
+
+    @classmethod
+    def empty(cls) -> Self:
+        """Room for them."""
+        return cls(np.empty((8, 3, 3)), np.empty((5, 6)), np.empty((6, 6, 6)))
+
+
+@kernel
+def fill_start(table, to_table, kept, h, ahead, position, orientation, velocity, omega, R, out):  # type: ignore[no-untyped-def]
     """Write pose 0 of a `Path`, from a state in world axes; `ahead`: one step after it, see `INTEGRATORS`.
 
     Args:
         table: (3, 3) its axes as columns; to_table: (4,) its inverse.  kept: (6,) 0 for what cannot move, else 1.
+        R: (3, 3) scratch.
     """
-    R = np.empty((3, 3))
     fill_rotation(orientation, R)
     before, arriving = out.before, out.arriving
     before[0], before[1], before[2] = into(table, position[0], position[1], position[2])
@@ -86,41 +99,52 @@ def fill_start(table, to_table, kept, h, ahead, position, orientation, velocity,
     arriving[3], arriving[4], arriving[5] = into(R, omega[0], omega[1], omega[2])
     for i in range(6):
         arriving[i] *= h * kept[i]
-    out.position[0], out.orientation[0] = before[:3], before[3:]
+    for i in range(3):
+        out.position[0, i] = before[i] + (arriving[i] if ahead else 0.0)
+    for i in range(4):
+        out.orientation[0, i] = before[3 + i]
     if ahead:
-        out.position[0] += arriving[:3]
         turn(before[3:], arriving[3:], out.orientation[0])
 
 
-@allocating
-def fill_motion(body, order, lag, h, path, wrench, force, out):  # type: ignore[no-untyped-def]
+@subroutine
+def fill_motion(body, order, lag, h, path, wrench, force, scratch, out):  # type: ignore[no-untyped-def]
     """Write the equations of motion, to first order in poses and exactly in wrench and force, about a path.
 
     Args:
         body: `Mechanics`.  order, lag: of the integrator.  h: [s].  path: `Path`.
         wrench, force: (N, nw), (N, K d) [N, N m], with which the forces' dependence on the pose is linearised; zero:
             it is not.
-        out: `Motion`.
+        scratch: `Scratch`.  out: `Motion`.
     """
     N, K, d = wrench.shape[0], body.points.shape[0], body.frames.shape[2]
     nw, units = body.pick.shape[0], body.units
-    R, hatted, turning = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    end, start, last_end, last_start = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    spin, gyro, gain = np.empty(3), np.empty((3, 3)), np.empty((6, 6))
-    y, last, rows, full = np.empty(6), path.arriving.copy(), np.empty(6), np.empty(6)
-    X = np.empty((3, 6, 6))
+    R, hatted, turning, gyro = scratch.turns[0], scratch.turns[1], scratch.turns[2], scratch.turns[3]
+    end, start, last_end, last_start = scratch.turns[4], scratch.turns[5], scratch.turns[6], scratch.turns[7]
+    y, last, rows, full, spin = (
+        scratch.poses[0], scratch.poses[1], scratch.poses[2], scratch.poses[3], scratch.poses[4]
+    )  # fmt: skip
+    X, gain = scratch.blocks[:3], scratch.blocks[3]
     unit, light = body.mass / h**2, 1.0 / h**2
+    for i in range(6):
+        last[i] = path.arriving[i]
+    for i in range(3):
+        for j in range(3):
+            last_end[i, j] = last_start[i, j] = 0.0
     for t in range(N):
         for i in range(3):
             y[i] = path.position[t + 1, i] - path.position[t, i]
         y[3], y[4], y[5] = rotation_error(path.orientation[t], path.orientation[t + 1])
         fill_difference_jacobians(y[3:], end, start)
         # inertia
-        X[:] = 0.0
+        for k in range(3):
+            for i in range(6):
+                for j in range(6):
+                    X[k, i, j] = 0.0
         for i in range(3):
             X[0, i, i], X[1, i, i] = unit, -unit
-        add_product(light, body.inertia, end, X[0, 3:, 3:])
-        add_product(light, body.inertia, start, X[1, 3:, 3:])
+        add_product(light, body.inertia, end, X[0], 3, 3)
+        add_product(light, body.inertia, start, X[1], 3, 3)
         for i in range(6):
             full[i] = y[i] - (order - 1) * last[i]
         for i in range(3):
@@ -145,19 +169,20 @@ def fill_motion(body, order, lag, h, path, wrench, force, out):  # type: ignore[
                 for j in range(3):
                     gyro[i, j] = -gyro[i, j] / h - light * body.inertia[i, j]
             fill_hat(last[3], last[4], last[5], hatted)
-            add_product(light, hatted, body.inertia, gyro)
-            add_product(1.0, gyro, last_end, X[1, 3:, 3:])
-            add_product(1.0, gyro, last_start, X[2, 3:, 3:])
+            add_product(light, hatted, body.inertia, gyro, 0, 0)
+            add_product(1.0, gyro, last_end, X[1], 3, 3)
+            add_product(1.0, gyro, last_start, X[2], 3, 3)
         # forces, at the pose where they act
         if lag == 2 and t == 0:
             fill_rotation(path.before[3:], R)
         else:
             fill_rotation(path.orientation[t + 1 - lag], R)
-        full[:] = 0.0
+        for i in range(6):
+            full[i] = 0.0
         for i in range(nw):
             full[body.pick[i]] = body.sign[i] * wrench[t, i]
         fill_hat(full[0], full[1], full[2], hatted)
-        add_product(1.0, R, hatted, X[lag, :3, 3:])  # R w turns by -R w^
+        add_product(1.0, R, hatted, X[lag], 0, 3)  # R w turns by -R w^
         for k in range(K):
             p0, p1, p2 = body.points[k, 0], body.points[k, 1], body.points[k, 2]
             g0 = g1 = g2 = 0.0
@@ -173,12 +198,12 @@ def fill_motion(body, order, lag, h, path, wrench, force, out):  # type: ignore[
                 g2 += b2 * force[t, d * k + j]
             fill_hat(g0, g1, g2, hatted)  # and R'g by (R'g)^
             fill_hat(p0, p1, p2, turning)
-            add_product(-1.0, turning, hatted, X[lag, 3:, 3:])
-        gain[:] = 0.0
+            add_product(-1.0, turning, hatted, X[lag], 3, 3)
         for i in range(3):
-            gain[3 + i, 3 + i] = 1.0
             for j in range(3):
                 gain[i, j] = R[i, j]
+                gain[i, 3 + j] = gain[3 + i, j] = 0.0
+                gain[3 + i, 3 + j] = 1.0 if i == j else 0.0
         for r in range(nw):
             sign = body.sign[r] / units.wrench[r]
             out.constant[t, r] = sign * rows[body.pick[r]]
@@ -187,6 +212,8 @@ def fill_motion(body, order, lag, h, path, wrench, force, out):  # type: ignore[
                 out.by_wrench[t, r, c] = -s * units.wrench[c] * gain[body.pick[r], body.pick[c]]
                 for k in range(3):
                     out.towards[k, t, r, c] = s * units.pose[c] * X[k, body.pick[r], body.pick[c]]
-        last[:] = y
-        last_end[:] = end
-        last_start[:] = start
+        for i in range(6):
+            last[i] = y[i]
+        for i in range(3):
+            for j in range(3):
+                last_end[i, j], last_start[i, j] = end[i, j], start[i, j]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from pivoting.controller import Body, Contact, Law, Motion, WrenchBounds, WrenchController, solve
+from pivoting.controller import Body, Contact, Law, Motion, WrenchController, solve
 from pivoting.controller.controller import step_worlds, world_wrench
 from pivoting.controller.stale import drop_stale_kernels
 from scipy.spatial.transform import Rotation
