@@ -178,7 +178,7 @@ def _way_out(
 ) -> str:
     """The nearest contact that would do, or else the one with the widest range, as the end of a message."""
     asked = arc or Arc(0.0, 0.0)
-    kinds = [kind for kind in ("edge", "vertex") if contact is not kind]
+    kinds = [kind for kind in ("edge", "vertex") if not (isinstance(contact, str) and contact == kind)]
     some: Iterable[Stance] = chain(*(search(body, kind, arc, now) for kind in kinds))
     if not isinstance(contact, str):
         at = np.atleast_2d(np.asarray(contact, dtype=float)).mean(axis=0)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.models.body_contacts import forced
 from pivoting.models.reading import initial_data
 
 Array = NDArray[np.float64]
@@ -80,10 +81,9 @@ def _inverse_inertia(model: mujoco.MjModel, data: mujoco.MjData, body: int, supp
     """
     M, rows, translation = np.zeros((model.nv, model.nv)), [], np.zeros((3, model.nv))
     mujoco.mj_fullM(model, data, M)
-    for contact in data.contact:
-        if contact.efc_address >= 0 and support in contact.geom and body in model.geom_bodyid[contact.geom]:
-            mujoco.mj_jac(model, data, translation, None, contact.pos, body)
-            rows.append(contact.frame.reshape(3, 3) @ translation)
+    for _, _, contact in forced(model, data, body, support):
+        mujoco.mj_jac(model, data, translation, None, contact.pos, body)
+        rows.append(contact.frame.reshape(3, 3) @ translation)
     J = np.concatenate(rows) if rows else np.zeros((0, model.nv))
     return np.asarray(J @ np.linalg.solve(M, J.T) / model.body_invweight0[body, 0])
 

@@ -12,11 +12,12 @@ from enum import Enum
 
 import mujoco
 import numpy as np
+from pivoting.models.body_contacts import contacts_of
 from pivoting.models.contact_rows import read_rows
 from pivoting.models.frames import Array, matrix, quaternion
 from pivoting.models.given import NEAR
+from pivoting.models.hull import body_size
 from pivoting.models.reading import RigidBody, initial_data, place
-from pivoting.models.supports import body_size
 from pivoting.models.tilt import Arc, Stance, cross
 
 PROBE = 1e-5  # of the body's size, how deep it is to make any contact
@@ -61,9 +62,8 @@ def grip(model: mujoco.MjModel, body: RigidBody, arc: Arc | None = None) -> Call
             level = _rotation(across, np.arctan(2.0 * leaning * depth / length)) @ level
         place(model, data, body, quaternion(table @ level), first + 0.5 * along, at)
         mujoco.mj_collision(model, data)
-        geoms = data.contact.geom
-        ours = (geoms == body.support).any(axis=1) & (model.geom_bodyid[geoms] == body.index).any(axis=1)
-        found = data.contact.pos[ours & (data.contact.dist < 0.0)]
+        ours = [one.contact for one in contacts_of(model, data, body.index) if one.other == body.support]
+        found = np.array([contact.pos for contact in ours if contact.dist < 0.0]).reshape(-1, 3)
         points = (found - data.xpos[body.index]) @ data.xmat[body.index].reshape(3, 3)
         points = points + stance.radius[0] * stance.up(theta) - first
         share = np.clip(points @ along / max(length**2, 1e-300), 0.0, 1.0)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pivoting.models.hull import colliding, ellipsoids
+from pivoting.models.hull import colliding
 from pivoting.models.naming import ModelError, body_name, geom_id, label
 from pivoting.models.under import first_met
 
@@ -118,10 +118,3 @@ def can_collide(model: mujoco.MjModel, one: int, other: int) -> bool:
         return False
     meet = model.geom_contype[one] & model.geom_conaffinity[other]
     return bool(meet or model.geom_contype[other] & model.geom_conaffinity[one])
-
-
-def body_size(model: mujoco.MjModel, body: int) -> float:
-    """Diagonal of the box, along the body's axes, around its colliding geoms [m]."""
-    _, centre, axes = ellipsoids(model, colliding(model, body))
-    reach = np.linalg.norm(axes, axis=2)
-    return float(np.linalg.norm((centre + reach).max(axis=0) - (centre - reach).min(axis=0)))

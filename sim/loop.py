@@ -18,11 +18,11 @@ from pivoting.models.contact_settings import contact_settings
 from pivoting.models.frames import matrix
 from pivoting.models.friction import read_friction
 from pivoting.models.given import NEAR
+from pivoting.models.hull import body_size
 from pivoting.models.naming import ModelError, body_id, geom_id
 from pivoting.models.reading import initial_data, place, read_body, turn
 from pivoting.models.scenes import Scene, load
 from pivoting.models.sensors import instrument
-from pivoting.models.supports import body_size
 from pivoting.sim.attach import Attached, attach
 from pivoting.sim.contact_readings import Declared
 from pivoting.sim.control import Answers, BoundedControl, Control, LawControl, States

@@ -11,9 +11,9 @@ from pivoting.models.candidates import planar_stance, stance
 from pivoting.models.frames import matrix, quaternion
 from pivoting.models.given import NEAR
 from pivoting.models.grip import grip
+from pivoting.models.hull import body_size
 from pivoting.models.naming import ModelError, label
 from pivoting.models.reading import RigidBody, file_frame, initial_data, read_body
-from pivoting.models.supports import body_size
 from pivoting.models.tilt import Arc
 from pivoting.sim.keys import LOWEST
 from pivoting.sim.relative import Load, load
