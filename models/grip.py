@@ -28,10 +28,14 @@ ANGLES = 5  # of an arc, or a range, at which it is asked
 
 
 class Grip(Enum):
-    """How the simulator holds a contact: an edge with two contacts, whichever of its ends is the deeper one; with other
-    corners that touch as well, as the contact is soft; or an edge with one contact at a time."""
+    """How the simulator holds a contact, the best first.
+
+    An edge with two contacts, whichever of its ends is the deeper one; with two only while a certain one is; with other
+    corners that touch as well, as the contact is soft; or an edge with one contact at a time.
+    """
 
     FIRM = "firm"
+    ONE_SIDED = "one-sided"
     CROWDED = "crowded"
     ALTERNATING = "alternating"
 
@@ -76,13 +80,15 @@ def grip(model: mujoco.MjModel, body: RigidBody, arc: Arc | None = None) -> Call
         touching(stance, ends[1], PROBE * size)
         rows = read_rows(model, body.index, body.support, [data.qpos])
         depth = max(PROBE * size, 0.0 if rows is None else float(rows.depth(load)))
-        edge, crowded = len(stance.points) == 2, False
+        edge, crowded, one_sided = len(stance.points) == 2, False, False
         for theta in np.linspace(*ends, ANGLES):
             found = [touching(stance, theta, depth, leaning) for leaning in ((-LEANING, LEANING) if edge else (0.0,))]
-            if edge and max(share.max(initial=0.0) - share.min(initial=1.0) for share, _ in found) < APART:
+            apart = [share.max(initial=0.0) - share.min(initial=1.0) >= APART for share, _ in found]
+            if edge and not any(apart):
                 return Grip.ALTERNATING
+            one_sided |= edge and not all(apart)
             crowded |= max(off.max(initial=0.0) for _, off in found) > NEAR * size
-        return Grip.CROWDED if crowded else Grip.FIRM
+        return Grip.CROWDED if crowded else Grip.ONE_SIDED if one_sided else Grip.FIRM
 
     return held
 
