@@ -149,4 +149,4 @@ def test_no_contact_changes_nothing() -> None:
         "</mujoco>"
     )
     chosen = contact_settings(model, 1, 0, [np.array([0, 0, 1.0, 1, 0, 0, 0])], 0.001)
-    assert chosen[:5] == pytest.approx((0.0021, 1.0, 0.5, 0, 0.0))
+    assert chosen[:6] == pytest.approx((0.0021, 1.0, 0.5, 0, 0.0, 0.0))
