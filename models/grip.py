@@ -24,7 +24,7 @@ PROBE = 1e-5  # of the body's size, how deep it is to make any contact
 LOAD = 0.5  # of the weight, which the smallest wrench leaves to the contact
 LEANING = 0.3  # share of the depth by which one end of an edge is deeper and the other less deep
 APART = 0.3  # of an edge's length: closer contacts do not hold it
-ANGLES = 5  # of an arc, or a range, at which it is asked
+STEP = np.deg2rad(1.0)  # of an arc, or a range, at which it is asked: between two faces MuJoCo changes its rule
 
 
 class Grip(Enum):
@@ -81,7 +81,7 @@ def grip(model: mujoco.MjModel, body: RigidBody, arc: Arc | None = None) -> Call
         rows = read_rows(model, body.index, body.support, [data.qpos])
         depth = max(PROBE * size, 0.0 if rows is None else float(rows.depth(load)))
         edge, crowded, one_sided = len(stance.points) == 2, False, False
-        for theta in np.linspace(*ends, ANGLES):
+        for theta in np.linspace(*ends, 2 + int((ends[1] - ends[0]) / STEP)):
             found = [touching(stance, theta, depth, leaning) for leaning in ((-LEANING, LEANING) if edge else (0.0,))]
             apart = [share.max(initial=0.0) - share.min(initial=1.0) >= APART for share, _ in found]
             if edge and not any(apart):

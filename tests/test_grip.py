@@ -1,4 +1,4 @@
-"""Whether the simulator holds an edge, asked of MuJoCo by hand: a body on it, a little more on one end than the other."""
+"""Whether the simulator holds an edge, asked of MuJoCo by hand: a body on it, one end deeper than the other."""
 
 import mujoco
 import numpy as np
