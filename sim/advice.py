@@ -204,7 +204,8 @@ def _floors(case: _Case) -> Iterator[float]:
     most = 20.0 * case.weight
     if rows is not None:
         w = run.angular_velocity[i] @ run.table_axes
-        c_n = float(np.nanmax(np.abs(np.cross(w[:, None], np.cross(w[:, None], run.turning[i]))[..., 2]), initial=0.0))
+        arm = run.turning[i] - run.stepped[i, :, None]
+        c_n = float(np.nanmax(np.abs(np.cross(w[:, None], np.cross(w[:, None], arm))[..., 2]), initial=0.0))
         opening = c_n * max(1.0 - 0.5 * rows.b * rows.h, 0.0) / rows.regularisation * rows.points / K
         some |= {2.0 * run.unit * opening}
     some |= {1.5 * error * (1.0 + run.mu_world) / spare}

@@ -62,6 +62,8 @@ HORIZON = "a receding horizon"
 GROUPS = (OBJECT, REFERENCE, CONTROLLER, BOUNDS, HORIZON, SIMULATOR)
 
 SCENE = "as the scene has it"
+CLOSED = "what keeps the contact closed as it turns"
+_WEIGHT = {"at_least": 0.0}
 _POSITIVE = {"above": 0.0}  # masses, and forces, which go with the weight: objects may be as large as they are
 _SLOPE, _ANGLE = {"above": -90.0, "below": 90.0}, {"at_least": LOWEST, "at_most": 90.0 - LOWEST}
 
@@ -99,7 +101,7 @@ KEYS = {
     "bandwidth": Key("of the law; of a quasi-dynamic one 1/h", CONTROLLER, "rad/s", _to(1e5)),
     "damping": Key("ratio of the law", CONTROLLER, "", _to(100.0)),
     "margin": Key("share of the friction that is kept unused", CONTROLLER, "", {"at_least": 0.0, "below": 1.0}),
-    "f_min": Key("floor of each contact's normal force", CONTROLLER, "N", {"at_least": 0.0}, relative="w"),
+    "f_min": Key("floor of each contact's normal force", CONTROLLER, "N", _WEIGHT, optional=CLOSED, relative="w"),
     "length": Key("lever at which moments cost as forces do", CONTROLLER, "m", _to(1e6), optional="to the CoM"),
     "force_max": Key("greatest force", BOUNDS, "N", _POSITIVE, optional="none", relative="w"),
     "moment_max": Key("greatest moment", BOUNDS, "N m", _POSITIVE, optional="none", relative="w"),
