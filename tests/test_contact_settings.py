@@ -157,7 +157,7 @@ LIGHT = '<inertial pos="0 0 0" mass="1" diaginertia="{0} {0} {0}"/><geom type="b
 
 @pytest.mark.parametrize("inertia", [4e-3, 1e-3, 1e-4])
 def test_one_contact_of_a_body_of_little_inertia_holds(tmp_path: Path, inertia: float) -> None:
-    """A plate whose lever weighs 20 to 800 times its inertia: it rings no longer than what the shipped settings serve."""
+    """A plate whose lever weighs 20 to 800 times its inertia: it rings no longer than a box does."""
     run = turned(tmp_path, LIGHT.format(inertia), "vertex")
     chosen, rows = settings(run), run.contact_rows
     assert rows is not None
