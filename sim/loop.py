@@ -282,8 +282,8 @@ def believe(
         read_friction(read.read, body_id(read.read, read.body), geom_id(read.read, read.support), plan.contacts)
     if controller is not None:
         _check(controller, case, plan)
-    floor = _floor(case.absolute(plan.load), plan)
-    if plan.load.force == 0.0 and (floor if controller is None else controller.belief.f_min.max()) == 0.0:
+    floor = case.f_min or 0.0 if controller is None else controller.belief.f_min.max()
+    if plan.load.force == 0.0 and floor == 0.0:
         raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the object on its support")
     if controller is not None:
         return Attached(nominal, plan.body, controller), plan
@@ -295,7 +295,7 @@ def believe(
         law=case.control_law(),
         mu=case.mu,
         margin=case.margin,
-        f_min=floor / read.unit,
+        f_min=_floor(case.absolute(plan.load), plan) / read.unit,
         Q_w=case.wrench_weight(plan.body.dim, read.unit),
         support=case.support,
     )
@@ -306,7 +306,7 @@ def _floor(case: Scenario, plan: Plan) -> float:
     """Of each contact's normal force [N]."""
     if case.f_min is not None:
         return float(case.f_min)
-    return closing_force(plan.body.mass, plan.unit * plan.arm, case.pace[1]) if plan.load.force > 0.0 else 0.0
+    return closing_force(plan.body.mass, plan.unit * plan.arm, case.pace[1])
 
 
 def _check(controller: WrenchController, case: Scenario, plan: Plan) -> None:
