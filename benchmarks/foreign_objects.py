@@ -15,7 +15,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -23,6 +23,9 @@ from brute_force import contacts
 from harness import main
 from object_list import SEED, Thing, listed, scene
 from replay import Tape, confirms, replay
+
+if TYPE_CHECKING:
+    from pivoting.sim import Run
 
 KINDS = ("vertex", "edge", "lowest")
 VARIANTS = {"20 deg in 2 s": {}, "to 60 deg": {"theta_end": 60.0}, "in 0.5 s": {"seconds": 0.5}}
@@ -89,14 +92,19 @@ def run(path: Path, thing: str, kind: str, variant: str, there: str) -> Outcome:
 
 
 def examined(path: Path, kind: str, variant: str, summary: dict[str, Any]) -> tuple[str, bool, str]:
-    """The reason that a failed run gave, whether MuJoCo alone bears it out, and what that shows."""
+    """The reasons that a failed run gave, whether MuJoCo alone bears them out, and what that shows."""
     from pivoting.sim import own_object, simulate
 
     run = simulate(own_object(path, "object", kind), **VARIANTS[variant])
-    failed = [f"{c.name} = {c.value:.3g}, at most {c.limit:.3g}" for c in run.checks if not c.passed]
-    sentence = "; ".join(summary.get("reasons") or failed)
+    facts, lever = replay(taped(run)), float(np.linalg.norm(run.points, axis=1).max())
+    shown = str(facts._replace(touching=facts.touching[-1:]))
+    return "; ".join(summary["reasons"]), confirms(summary["reasons"], facts, summary["limits"], lever), shown
+
+
+def taped(run: "Run") -> Tape:
+    """The first world of a run."""
     table = np.array(run.table_axes)
-    tape = Tape(
+    return Tape(
         model=run.model,
         body=run.truth.index,
         qpos=run.start[0][0],
@@ -110,9 +118,6 @@ def examined(path: Path, kind: str, variant: str, summary: dict[str, Any]) -> tu
         force=np.nan_to_num(run.force[0]) @ table.T,
         settle=round(run.scenario.limits.settle_s / run.dt),
     )
-    facts = replay(tape)
-    lever = float(np.linalg.norm(run.points, axis=1).max())
-    return sentence, confirms(sentence, facts, summary["limits"], lever), str(facts)
 
 
 def prepared(thing: Thing) -> tuple[Path, dict[str, str], dict[str, str]]:

@@ -150,17 +150,15 @@ def planar_stance(
 
 
 def _chosen(found: Iterable[Stance], gripped: Gripped | None) -> tuple[Stance | None, Stance | None]:
-    """The first that is held firmly, or else somehow; and the first that is not held."""
-    crowded = alternating = None
+    """The first that is held firmly, or else as well as any; and the first that is not held."""
+    first: dict[Grip, Stance] = {}
     for tried, one in enumerate(found):
         how = Grip.FIRM if gripped is None else gripped(one)
-        if how is Grip.FIRM:
-            return one, alternating
-        crowded = crowded or (one if how is Grip.CROWDED else None)
-        alternating = alternating or (one if how is Grip.ALTERNATING else None)
-        if crowded is not None and tried >= TRIES:
+        first.setdefault(how, one)
+        if how is Grip.FIRM or (tried >= TRIES and first.keys() - {Grip.ALTERNATING}):
             break
-    return crowded, alternating
+    alternating = first.pop(Grip.ALTERNATING, None)
+    return next((first[how] for how in Grip if how in first), None), alternating
 
 
 def _down(body: Hull, one: Stance) -> Array:
@@ -178,7 +176,7 @@ def _way_out(
 ) -> str:
     """The nearest contact that would do, or else the one with the widest range, as the end of a message."""
     asked = arc or Arc(0.0, 0.0)
-    kinds = [kind for kind in ("edge", "vertex") if contact is not kind]
+    kinds = [kind for kind in ("edge", "vertex") if not (isinstance(contact, str) and contact == kind)]
     some: Iterable[Stance] = chain(*(search(body, kind, arc, now) for kind in kinds))
     if not isinstance(contact, str):
         at = np.atleast_2d(np.asarray(contact, dtype=float)).mean(axis=0)

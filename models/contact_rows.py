@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pivoting.models.body_contacts import forced
 from pivoting.models.reading import initial_data
 
 Array = NDArray[np.float64]
@@ -91,14 +92,9 @@ def read_rows(model: mujoco.MjModel, body: int, support: int, placements: Iterab
     for qpos in placements:
         data.qpos[:] = qpos
         mujoco.mj_fwdPosition(model, data)
-        ends = [model.geom_bodyid[contact.geom] for contact in data.contact]
-        own = [
-            contact
-            for contact, bodies in zip(data.contact, ends, strict=True)
-            if contact.efc_address >= 0 and support in contact.geom and body in bodies
-        ]
+        own = forced(model, data, body, support)
         points = points or len(own)
-        found += [_row(model, data, contact) for contact in own]
+        found += [_row(model, data, one.contact) for one in own]
     if not found:
         return None
     first, unknown = found[0], _unknown(model, body)

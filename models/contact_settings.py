@@ -1,10 +1,13 @@
-"""How soft the chosen contacts are: as in settings.xml, or softer where many contacts hold one body at once.
+"""How soft the chosen contacts are: as in settings.xml, or softer where many hold one body, or one a light-footed one.
 
-MuJoCo makes each contact as soft as is right for it alone: R = (1 - d) / d D, with D the body's own inverse mass. What
-the contacts of a body have together is the inverse inertia A = J M^-1 J' between all of them. Where an eigenvalue of it
-is c D, they give way there by the share c / (c + (1 - d) / d) of their reference, and a step of that is stable only
-while share (2 b h + k h^2) < 4. So (1 - d) / d grows with the greatest c, the `coupling`, and timeconst and dampratio
-with it, such that b, k and the share stay those of settings.xml: docs/fidelity.md derives and measures it.
+MuJoCo makes each contact as soft as is right for a body's mass alone: R = (1 - d) / d D, with D its inverse. What the
+contacts of a body have together is the inverse inertia A = J M^-1 J' between all of them. Where an eigenvalue of it is
+c D, they give way there by the share c / (c + (1 - d) / d) of their reference, and a step of that is stable only while
+share (2 b h + k d h^2) < 4. Up to a c of 9 the settings are those of settings.xml. Where many contacts make it greater,
+the `coupling`, (1 - d) / d grows with their number, and timeconst and dampratio such that b and k stay. Where one alone
+does, far from the CoM of a body of little inertia, timeconst grows until share (2 b h + k d h^2) is that of 9. (If that
+one gave way more, the force that the law counts on would be off by more, which turns a light body at once: contact and
+law together would ring until they diverge.) docs/fidelity.md derives and measures it.
 """
 
 from collections.abc import Iterable
@@ -13,12 +16,14 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.models.body_contacts import forced
 from pivoting.models.reading import initial_data
 
 Array = NDArray[np.float64]
 STIFF = 2.1  # time constant of the contacts, in time steps: see settings.xml
 IMPEDANCE = 0.5  # see settings.xml
 COUPLED = 9.0  # coupling up to which settings.xml serves: the normal rows' ringing dies as fast as the friction rows'
+RINGING = COUPLED / (COUPLED + 1.0) * (8.0 / STIFF + 2.0 / STIFF**2)  # share (2 b h + k d h^2) there
 
 
 class ContactSettings(NamedTuple):
@@ -29,6 +34,7 @@ class ContactSettings(NamedTuple):
         impedance: the constant solimp.
         contacts: most contacts at once.
         coupling: greatest eigenvalue of their normal rows' A / D, the friction rows holding.
+        alone: the same of the one contact of which it is greatest.
         reason: for these parameters, in words.
     """
 
@@ -37,6 +43,7 @@ class ContactSettings(NamedTuple):
     impedance: float
     contacts: int
     coupling: float
+    alone: float
     reason: str
 
 
@@ -52,24 +59,30 @@ def contact_settings(
         dt: time step [s].
     """
     data = initial_data(model)
-    contacts, coupling = 0, 0.0
+    contacts, coupling, alone, impratio = 0, 0.0, 0.0, float(model.opt.impratio)
     for qpos in placements:
         data.qpos[:] = qpos
         mujoco.mj_fwdPosition(model, data)
         A = _inverse_inertia(model, data, body, support)
         contacts = max(contacts, len(A) // 3)
-        coupling = max(coupling, _normal_coupling(A, float(model.opt.impratio)))
-    ratio = max(1.0, coupling / COUPLED)
+        coupling = max(coupling, _normal_coupling(A, impratio))
+        each = (slice(i, i + 3) for i in range(0, len(A), 3))
+        alone = max([alone, *(_normal_coupling(A[one, one], impratio) for one in each)])
+    one = max(COUPLED, alone)
+    ratio = max(1.0, coupling / one)
     impedance = IMPEDANCE / (IMPEDANCE + (1.0 - IMPEDANCE) * ratio)
     softer = impedance / IMPEDANCE
+    steps = 2.0 / (np.sqrt(16.0 + 2.0 * RINGING * (one + 1.0) / one) - 4.0)  # 8 / steps + 2 / steps^2 = ringing / share
     told = f"{contacts} contact{'s' * (contacts != 1)} at once, {coupling:.3g} times as stiff as one on the body alone"
+    softened = ratio > 1.0 or one > COUPLED
     return ContactSettings(
-        timeconst=STIFF * dt / softer,
+        timeconst=float(steps) * dt / softer,
         dampratio=float(np.sqrt(softer)),
         impedance=impedance,
         contacts=contacts,
         coupling=coupling,
-        reason=f"{told}: " + ("made softer, or they would bounce" if ratio > 1.0 else "as in the shipped scenes"),
+        alone=alone,
+        reason=f"{told}: " + ("made softer, or they would bounce" if softened else "as in the shipped scenes"),
     )
 
 
@@ -80,10 +93,9 @@ def _inverse_inertia(model: mujoco.MjModel, data: mujoco.MjData, body: int, supp
     """
     M, rows, translation = np.zeros((model.nv, model.nv)), [], np.zeros((3, model.nv))
     mujoco.mj_fullM(model, data, M)
-    for contact in data.contact:
-        if contact.efc_address >= 0 and support in contact.geom and body in model.geom_bodyid[contact.geom]:
-            mujoco.mj_jac(model, data, translation, None, contact.pos, body)
-            rows.append(contact.frame.reshape(3, 3) @ translation)
+    for _, _, contact in forced(model, data, body, support):
+        mujoco.mj_jac(model, data, translation, None, contact.pos, body)
+        rows.append(contact.frame.reshape(3, 3) @ translation)
     J = np.concatenate(rows) if rows else np.zeros((0, model.nv))
     return np.asarray(J @ np.linalg.solve(M, J.T) / model.body_invweight0[body, 0])
 

@@ -5,9 +5,9 @@ from collections.abc import Iterable
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.models.hull import ellipsoids
+from pivoting.models.hull import body_size, ellipsoids
 from pivoting.models.naming import ModelError, label
-from pivoting.models.supports import body_size, can_collide
+from pivoting.models.supports import can_collide
 
 LEAST = 1e-5  # MuJoCo's own least friction, mjMINMU: a coefficient of 0 counts as this
 EDGE = 65  # points along an edge at which rims and round ends are looked for

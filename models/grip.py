@@ -12,25 +12,30 @@ from enum import Enum
 
 import mujoco
 import numpy as np
+from pivoting.models.body_contacts import contacts_of
 from pivoting.models.contact_rows import read_rows
 from pivoting.models.frames import Array, matrix, quaternion
 from pivoting.models.given import NEAR
+from pivoting.models.hull import body_size
 from pivoting.models.reading import RigidBody, initial_data, place
-from pivoting.models.supports import body_size
 from pivoting.models.tilt import Arc, Stance, cross
 
 PROBE = 1e-5  # of the body's size, how deep it is to make any contact
 LOAD = 0.5  # of the weight, which the smallest wrench leaves to the contact
 LEANING = 0.3  # share of the depth by which one end of an edge is deeper and the other less deep
 APART = 0.3  # of an edge's length: closer contacts do not hold it
-ANGLES = 5  # of an arc, or a range, at which it is asked
+STEP = np.deg2rad(1.0)  # of an arc, or a range, at which it is asked: between two faces MuJoCo changes its rule
 
 
 class Grip(Enum):
-    """How the simulator holds a contact: an edge with two contacts, whichever of its ends is the deeper one; with other
-    corners that touch as well, as the contact is soft; or an edge with one contact at a time."""
+    """How the simulator holds a contact, the best first.
+
+    An edge with two contacts, whichever of its ends is the deeper one; with two only while a certain one is; with other
+    corners that touch as well, as the contact is soft; or an edge with one contact at a time.
+    """
 
     FIRM = "firm"
+    ONE_SIDED = "one-sided"
     CROWDED = "crowded"
     ALTERNATING = "alternating"
 
@@ -61,9 +66,8 @@ def grip(model: mujoco.MjModel, body: RigidBody, arc: Arc | None = None) -> Call
             level = _rotation(across, np.arctan(2.0 * leaning * depth / length)) @ level
         place(model, data, body, quaternion(table @ level), first + 0.5 * along, at)
         mujoco.mj_collision(model, data)
-        geoms = data.contact.geom
-        ours = (geoms == body.support).any(axis=1) & (model.geom_bodyid[geoms] == body.index).any(axis=1)
-        found = data.contact.pos[ours & (data.contact.dist < 0.0)]
+        ours = [one.contact for one in contacts_of(model, data, body.index) if one.other == body.support]
+        found = np.array([contact.pos for contact in ours if contact.dist < 0.0]).reshape(-1, 3)
         points = (found - data.xpos[body.index]) @ data.xmat[body.index].reshape(3, 3)
         points = points + stance.radius[0] * stance.up(theta) - first
         share = np.clip(points @ along / max(length**2, 1e-300), 0.0, 1.0)
@@ -76,13 +80,15 @@ def grip(model: mujoco.MjModel, body: RigidBody, arc: Arc | None = None) -> Call
         touching(stance, ends[1], PROBE * size)
         rows = read_rows(model, body.index, body.support, [data.qpos])
         depth = max(PROBE * size, 0.0 if rows is None else float(rows.depth(load)))
-        edge, crowded = len(stance.points) == 2, False
-        for theta in np.linspace(*ends, ANGLES):
+        edge, crowded, one_sided = len(stance.points) == 2, False, False
+        for theta in np.linspace(*ends, 2 + int((ends[1] - ends[0]) / STEP)):
             found = [touching(stance, theta, depth, leaning) for leaning in ((-LEANING, LEANING) if edge else (0.0,))]
-            if edge and max(share.max(initial=0.0) - share.min(initial=1.0) for share, _ in found) < APART:
+            apart = [share.max(initial=0.0) - share.min(initial=1.0) >= APART for share, _ in found]
+            if edge and not any(apart):
                 return Grip.ALTERNATING
+            one_sided |= edge and not all(apart)
             crowded |= max(off.max(initial=0.0) for _, off in found) > NEAR * size
-        return Grip.CROWDED if crowded else Grip.FIRM
+        return Grip.CROWDED if crowded else Grip.ONE_SIDED if one_sided else Grip.FIRM
 
     return held
 

@@ -171,7 +171,6 @@ def read_hull(model: mujoco.MjModel, index: int, tolerance: float = TOLERANCE) -
     if not geoms:
         raise ModelError(f"body = {name!r}: it has no colliding geom; must have one with contype, conaffinity or pair")
     geom, centre, axes = ellipsoids(model, geoms)
-    extent = np.linalg.norm(axes, axis=2)
     half = np.linalg.norm(axes, axis=1)
     rank = np.count_nonzero(half, axis=1)
     radius = np.where(np.ptp(half, axis=1) <= 1e-9 * half.max(axis=1), half.max(axis=1), 0.0)
@@ -179,7 +178,7 @@ def read_hull(model: mujoco.MjModel, index: int, tolerance: float = TOLERANCE) -
     if (rank == 3).all() and (balls == 0 or balls + np.count_nonzero(radius == 0.0) < 2):
         rolls = "it is all sphere or ellipsoid, and these roll: no tilt lifts it off one point"
         raise ModelError(f"body = {name!r}: {rolls}; must have a box, a mesh, a cylinder or a capsule")
-    size = float(np.linalg.norm((centre + extent).max(axis=0) - (centre - extent).min(axis=0)))
+    size = _diagonal(centre, axes)
     points, owner = sampled(centre, axes, SAMPLES)
     try:  # C-: facets that are coplanar but for rounding (meshes are float32) become one, their inner corners none
         hull = ConvexHull(points, qhull_options=f"Qt C-{0.1 * TOLERANCE * size}")
@@ -192,6 +191,17 @@ def read_hull(model: mujoco.MjModel, index: int, tolerance: float = TOLERANCE) -
     ups, beside = -hull.equations[:, :3], hull.neighbors.astype(int)
     labels = {geom: label(model, geom) for geom in geoms}
     return Hull(name, labels, com, *fields, ups, facets, beside, size, tolerance * size)
+
+
+def body_size(model: mujoco.MjModel, index: int) -> float:
+    """Diagonal of the box, along the body's axes, around its colliding geoms [m]."""
+    return _diagonal(*ellipsoids(model, colliding(model, index))[1:])
+
+
+def _diagonal(centre: Array, axes: Array) -> float:
+    """Of the box around some ellipsoids c + A x."""
+    reach = np.linalg.norm(axes, axis=2)
+    return float(np.linalg.norm((centre + reach).max(axis=0) - (centre - reach).min(axis=0)))
 
 
 def sampled(centre: Array, axes: Array, shapes: Mapping[int, Array]) -> tuple[Array, Indices]:

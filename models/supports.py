@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pivoting.models.hull import colliding, ellipsoids
+from pivoting.models.hull import colliding
 from pivoting.models.naming import ModelError, body_name, geom_id, label
 from pivoting.models.under import first_met
 
@@ -22,6 +22,7 @@ class Surface:
         axes: (3, 3) columns (t, o, n) in the world, n the outward normal.
         origin: (3,) its middle, world axes [m].
         half: (2,) how far it reaches along t and o [m]; inf for a plane.
+        thick: how far its geom goes down below it [m]; inf for a plane.
         disc: whether it is a disc of radius half[0], not a rectangle.
     """
 
@@ -29,6 +30,7 @@ class Surface:
     axes: Array
     origin: Array
     half: Array
+    thick: float
     disc: bool
 
     def beyond(self, points: ArrayLike) -> Array:
@@ -59,7 +61,7 @@ def support_surface(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Su
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
     R, up = data.geom_xmat[geom].reshape(3, 3), upward(model)
     if kind == PLANE:
-        return Surface(geom, np.array(R), np.array(data.geom_xpos[geom]), np.full(2, np.inf), False)
+        return Surface(geom, np.array(R), np.array(data.geom_xpos[geom]), np.full(2, np.inf), np.inf, False)
     k = int(np.abs(R.T @ up).argmax())
     if kind not in (BOX, CYLINDER) or (kind == CYLINDER and k != 2):
         word = mujoco.mjtGeom(kind).name.removeprefix("mjGEOM_").lower()
@@ -67,13 +69,14 @@ def support_surface(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Su
         out = "must be a plane, a box or an upright cylinder: give the model a box there, or name another --support"
         raise ModelError(f"support = {label(model, geom)}: {told}; {out}")
     n, t = R[:, k] * (1.0 if R[:, k] @ up >= 0.0 else -1.0), R[:, (k + 1) % 3]
-    thick = size[1] if kind == CYLINDER else size[k]
+    below = float(size[1] if kind == CYLINDER else size[k])  # half of it
     half = np.full(2, size[0]) if kind == CYLINDER else size[[(k + 1) % 3, (k + 2) % 3]]
     return Surface(
         geom,
         np.column_stack([t, np.cross(n, t), n]),
-        data.geom_xpos[geom] + thick * n,
+        data.geom_xpos[geom] + below * n,
         np.array(half, dtype=float),
+        2.0 * below,
         kind == CYLINDER,
     )
 
@@ -115,10 +118,3 @@ def can_collide(model: mujoco.MjModel, one: int, other: int) -> bool:
         return False
     meet = model.geom_contype[one] & model.geom_conaffinity[other]
     return bool(meet or model.geom_contype[other] & model.geom_conaffinity[one])
-
-
-def body_size(model: mujoco.MjModel, body: int) -> float:
-    """Diagonal of the box, along the body's axes, around its colliding geoms [m]."""
-    _, centre, axes = ellipsoids(model, colliding(model, body))
-    reach = np.linalg.norm(axes, axis=2)
-    return float(np.linalg.norm((centre + reach).max(axis=0) - (centre - reach).min(axis=0)))

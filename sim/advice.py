@@ -156,9 +156,11 @@ def _remedies(case: _Case) -> Iterator[Remedy]:
     run, scenario, i = case.run, case.run.scenario, case.world
     slid, let_go = case.slid is not None, case.let_go is not None
     if case.diverged is not None or scenario.bandwidth * run.dt > QUICK:
-        yield Remedy({"bandwidth": _up(0.5 * QUICK / run.dt)}, "a law that the time step can follow")
+        slower = min(_up(0.5 * QUICK / run.dt), 0.5 * scenario.bandwidth)
+        yield Remedy({"bandwidth": slower}, "a law that the time step can follow")
+    softer = Remedy({"timeconst": 3.0 * float(run.model.geom_solref[run.truth.support, 0])}, "a softer contact")
     if case.diverged is not None:
-        yield Remedy({"dt": run.dt / 4.0}, "a finer time step")
+        yield from (Remedy({"dt": run.dt / 4.0}, "a finer time step"), softer)
         return
     first = int((run.contacts.strays[i] > 0.0).argmax()) if run.strays else len(run.time)
     if first < (len(run.time) if case.let_go is None else case.let_go):  # else it fell on what it touches
@@ -181,7 +183,7 @@ def _remedies(case: _Case) -> Iterator[Remedy]:
             yield Remedy({"bandwidth": _up(higher)}, "a stiffer law")
         yield Remedy({"dt": run.dt / 4.0}, "a finer time step")
     if let_go or case.failed("force_mismatch_rel"):
-        yield Remedy({"timeconst": 3.0 * float(run.model.geom_solref[run.truth.support, 0])}, "a softer contact")
+        yield softer
 
 
 def _pressed(case: _Case, spare: Mapping[str, float]) -> Iterator[Remedy]:
@@ -204,7 +206,8 @@ def _floors(case: _Case) -> Iterator[float]:
     most = 20.0 * case.weight
     if rows is not None:
         w = run.angular_velocity[i] @ run.table_axes
-        c_n = float(np.nanmax(np.abs(np.cross(w[:, None], np.cross(w[:, None], run.turning[i]))[..., 2]), initial=0.0))
+        arm = run.turning[i] - run.stepped[i, :, None]
+        c_n = float(np.nanmax(np.abs(np.cross(w[:, None], np.cross(w[:, None], arm))[..., 2]), initial=0.0))
         opening = c_n * max(1.0 - 0.5 * rows.b * rows.h, 0.0) / rows.regularisation * rows.points / K
         some |= {2.0 * run.unit * opening}
     some |= {1.5 * error * (1.0 + run.mu_world) / spare}

@@ -62,6 +62,10 @@ HORIZON = "a receding horizon"
 GROUPS = (OBJECT, REFERENCE, CONTROLLER, BOUNDS, HORIZON, SIMULATOR)
 
 SCENE = "as the scene has it"
+STEP = "as the scene has it, for a large object of your own finer"
+CLOSED = "what keeps the contact closed as it turns"
+_WEIGHT = {"at_least": 0.0}
+_POSITIVE = {"above": 0.0}  # masses, and forces, which go with the weight: objects may be as large as they are
 _SLOPE, _ANGLE = {"above": -90.0, "below": 90.0}, {"at_least": LOWEST, "at_most": 90.0 - LOWEST}
 
 
@@ -81,11 +85,11 @@ KEYS = {
     "law": Key("from the error of the pose to the wrench", CONTROLLER, words=FORMULATIONS),
     "integrator": Key("of the motion, step by step", HORIZON, words=tuple(INTEGRATORS)),
     "mu": Key("friction between them", OBJECT, "", _to(10.0), optional=SCENE),
-    "mass": Key("of the object", OBJECT, "kg", _to(1e6), optional=SCENE),
+    "mass": Key("of the object", OBJECT, "kg", _POSITIVE, optional=SCENE),
     "size": Key("longest side of the object, a box", OBJECT, "m", _to(1e3), optional=SCENE),
     "incline": Key("angle by which the support rises to the right", OBJECT, "deg", _SLOPE, optional=SCENE),
     "gravity": Key("its size; it points as in the file", OBJECT, "m/s^2", _from_0_to(1e3), optional=SCENE),
-    "dt": Key("time step", SIMULATOR, "s", _to(0.1), optional=SCENE),
+    "dt": Key("time step", SIMULATOR, "s", _to(0.1), optional=STEP),
     "timeconst": Key("time constant of the contact", SIMULATOR, "s", _to(1.0), optional="2.1 dt"),
     "impedance": Key("of the contact (solimp)", SIMULATOR, "", {"above": 0.0, "below": 1.0}, optional=SCENE),
     "impratio": Key("how much stiffer the contact is along the support", SIMULATOR, "", _to(1e9), optional=SCENE),
@@ -98,12 +102,15 @@ KEYS = {
     "bandwidth": Key("of the law; of a quasi-dynamic one 1/h", CONTROLLER, "rad/s", _to(1e5)),
     "damping": Key("ratio of the law", CONTROLLER, "", _to(100.0)),
     "margin": Key("share of the friction that is kept unused", CONTROLLER, "", {"at_least": 0.0, "below": 1.0}),
-    "f_min": Key("floor of each contact's normal force", CONTROLLER, "N", _from_0_to(1e9), relative="w"),
+    "f_min": Key(
+        "floor of each contact's normal force (of an object of your own what keeps it closed)", CONTROLLER, "N",
+        _WEIGHT, optional=CLOSED, relative="w",
+    ),
     "length": Key("lever at which moments cost as forces do", CONTROLLER, "m", _to(1e6), optional="to the CoM"),
-    "force_max": Key("greatest force", BOUNDS, "N", _to(1e9), optional="none", relative="w"),
-    "moment_max": Key("greatest moment", BOUNDS, "N m", _to(1e9), optional="none", relative="w"),
-    "force_rate": Key("fastest change of the force", BOUNDS, "N/s", _to(1e12), optional="none", relative="w"),
-    "moment_rate": Key("fastest change of the moment", BOUNDS, "N m/s", _to(1e12), optional="none", relative="w"),
+    "force_max": Key("greatest force", BOUNDS, "N", _POSITIVE, optional="none", relative="w"),
+    "moment_max": Key("greatest moment", BOUNDS, "N m", _POSITIVE, optional="none", relative="w"),
+    "force_rate": Key("fastest change of the force", BOUNDS, "N/s", _POSITIVE, optional="none", relative="w"),
+    "moment_rate": Key("fastest change of the moment", BOUNDS, "N m/s", _POSITIVE, optional="none", relative="w"),
     "plan_hz": Key("how often it is planned", HORIZON, "Hz", _to(1e4), optional="never"),
     "plan_steps": Key("how many steps a plan has", HORIZON, "", {"at_least": 1, "at_most": 1000}, whole=True),
     "plan_step": Key("duration of one of them", HORIZON, "s", _to(10.0), relative="T"),

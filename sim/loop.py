@@ -18,17 +18,18 @@ from pivoting.models.contact_settings import contact_settings
 from pivoting.models.frames import matrix
 from pivoting.models.friction import read_friction
 from pivoting.models.given import NEAR
+from pivoting.models.hull import body_size
 from pivoting.models.naming import ModelError, body_id, geom_id
 from pivoting.models.reading import initial_data, place, read_body, turn
 from pivoting.models.scenes import Scene, load
 from pivoting.models.sensors import instrument
-from pivoting.models.supports import body_size
 from pivoting.sim.attach import Attached, attach
 from pivoting.sim.contact_readings import Declared
 from pivoting.sim.control import Answers, BoundedControl, Control, LawControl, States
 from pivoting.sim.engine_log import engine_log
 from pivoting.sim.joint_drag import drag_wrench
 from pivoting.sim.keys import CONTROL_KEYS
+from pivoting.sim.pace import closing_force, fine_step
 from pivoting.sim.plan import Plan, planned, transplanted
 from pivoting.sim.planning import horizon_control, play_control
 from pivoting.sim.run import Run, frozen
@@ -38,7 +39,9 @@ from pivoting.sim.stepping import ContactLog, run_steps
 from pivoting.sim.strays import contact_margin, refuse_strays
 
 Array = NDArray[np.float64]
-START_DEPTH = 1e-6  # of the lever from contact to CoM: there is contact from the first step on
+START_DEPTH = (
+    1e-6  # of the lever from contact to CoM, where no load says how deep: there is contact from the first step
+)
 DEEPEST = 1e-2  # likewise, that an object is put at rest in its support
 PRESSED, SAMPLES = 1e-3, 17  # levers that it is pressed in, and where along its way, to see what it touches with
 Samples = tuple[Array, Array, Array]  # orientations, angular velocities and accelerations
@@ -81,7 +84,7 @@ def simulate(
     scene = load(case.path, body=case.body, support=case.support, chosen=case.chosen)
     attached, believed = believe(case, controller, scene)
     asked, case = case, case.absolute(believed.load)
-    world = scene.changed(case.actual)
+    world = _finely_stepped(scene.changed(case.actual), case, believed)
     model, where = _instrumented(world)
     truth = read_body(model, world.body, world.support)
     plan = transplanted(believed, model, truth, world.scale / scene.changed(case.believed).scale)
@@ -186,6 +189,20 @@ def simulate(
     )
 
 
+def _finely_stepped(world: Scene, case: Scenario, plan: Plan) -> Scene:
+    """With a finer time step, where the settings are chosen and an object so large would drift too far as it turns."""
+    if not case.chosen or "dt" in case.actual:
+        return world
+    limits = case.limits.for_object(plan.load.lever, plan.unit * float(np.linalg.norm(plan.body.gravity)))
+    assert limits.slip_m is not None, "limits are for a lever"
+    given = float(world.spec.option.timestep)
+    dt = fine_step(given, plan.unit * plan.arm, *case.pace, limits.slip_m)
+    if dt == given:
+        return world
+    finer = world.changed({**case.actual, "dt": dt})
+    return replace(finer, replaced=(*finer.replaced, ("timestep", f"{given:g}")))
+
+
 def _instrumented(world: Scene) -> tuple[mujoco.MjModel, dict[str, slice]]:
     """The model that is simulated, and where each reading is in its sensordata."""
     model, where = instrument(world)
@@ -226,7 +243,8 @@ def _start(
     Everything else is where the model's first keyframe, or else qpos0, has it.
 
     Args:
-        depth: at which it rests under its load; one that has less to carry at first would slide [m].
+        depth: at which it rests under its load, 0 if that is not known [m]; one that has less to carry at first would
+            slide, and one that has more is thrown up.
 
     Raises:
         ModelError: the object would touch something else there; it is named.
@@ -234,7 +252,7 @@ def _start(
     body = plan.body
     data, up, point = initial_data(model), matrix(body.table)[:, 2], plan.contacts[0]
     lever = float(np.linalg.norm(body.com - point) + plan.radius[0])
-    depth = float(np.clip(depth, START_DEPTH * lever, DEEPEST * lever))
+    depth = min(depth or START_DEPTH * lever, DEEPEST * lever)
     kind, floats = int(mujoco.mjtState.mjSTATE_INTEGRATION), 0.0
     state = np.empty(mujoco.mj_stateSize(model, kind))
     for row, error in zip(batch.state, errors, strict=True):
@@ -264,7 +282,8 @@ def believe(
         read_friction(read.read, body_id(read.read, read.body), geom_id(read.read, read.support), plan.contacts)
     if controller is not None:
         _check(controller, case, plan)
-    if plan.load.force == 0.0 and (case.f_min if controller is None else controller.belief.f_min.max()) == 0.0:
+    floor = case.f_min or 0.0 if controller is None else controller.belief.f_min.max()
+    if plan.load.force == 0.0 and floor == 0.0:
         raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the object on its support")
     if controller is not None:
         return Attached(nominal, plan.body, controller), plan
@@ -276,11 +295,18 @@ def believe(
         law=case.control_law(),
         mu=case.mu,
         margin=case.margin,
-        f_min=float(case.absolute(plan.load).f_min) / read.unit,
+        f_min=_floor(case.absolute(plan.load), plan) / read.unit,
         Q_w=case.wrench_weight(plan.body.dim, read.unit),
         support=case.support,
     )
     return attached, plan
+
+
+def _floor(case: Scenario, plan: Plan) -> float:
+    """Of each contact's normal force [N]."""
+    if case.f_min is not None:
+        return float(case.f_min)
+    return closing_force(plan.body.mass, plan.unit * plan.arm, case.pace[1])
 
 
 def _check(controller: WrenchController, case: Scenario, plan: Plan) -> None:

@@ -11,17 +11,17 @@ from pivoting.models.candidates import planar_stance, stance
 from pivoting.models.frames import matrix, quaternion
 from pivoting.models.given import NEAR
 from pivoting.models.grip import grip
+from pivoting.models.hull import body_size
 from pivoting.models.naming import ModelError, label
 from pivoting.models.reading import RigidBody, file_frame, initial_data, read_body
-from pivoting.models.supports import body_size
 from pivoting.models.tilt import Arc
+from pivoting.sim.fidelity import stepped_point
 from pivoting.sim.keys import LOWEST
 from pivoting.sim.relative import Load, load
-from pivoting.sim.scenario import Scenario
+from pivoting.sim.scenario import PACE, Scenario
 
 Array = NDArray[np.float64]
 ANY = Load(1e-6, 1.0, 1e-6)  # so small that nothing that is relative to it is too large
-SAMPLES = 2001  # of a motion, to see how far it goes
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +37,7 @@ class Plan:
         start: (4,) orientation at angle 0, object axes to world.
         range: the angles [rad] at which nothing else touches the support.
         face: (P, 3) the corners that touch as well at angle 0, body frame [m].
+        arm: from the point of the object whose velocity MuJoCo steps to the farthest contact [m].
         unit: of the model's lengths [m]; all the above is in it.
     """
 
@@ -48,6 +49,7 @@ class Plan:
     start: Array
     range: tuple[float, float]
     face: Array
+    arm: float = 0.0
     unit: float = 1.0
 
     @property
@@ -69,7 +71,8 @@ def planned(case: Scenario, model: mujoco.MjModel, unit: float = 1.0) -> Plan:
     found = _planar(case, model, body) if body.dim == 2 else _spatial(case, model, body)
     held = (found.contacts - found.contacts[0]) @ (matrix(found.start) @ matrix(body.axes).T).T
     _refuse_beside(model, body, found.at + held, NEAR * size, "the contact", unit)
-    return replace(found, unit=unit)
+    away = np.linalg.norm(found.contacts - stepped_point(model, body.index), axis=1) + found.radius
+    return replace(found, arm=float(away.max()), unit=unit)
 
 
 def _refuse_beside(model: mujoco.MjModel, body: RigidBody, at: Array, allowed: float, what: str, unit: float) -> None:
@@ -138,7 +141,7 @@ def _arc(case: Scenario) -> Arc | None:
     if not isinstance(case.reference, str) and isinstance(case.seconds, str):
         return None
     case = case.absolute(ANY)
-    time = np.linspace(0.0, case.duration, SAMPLES)
+    time = np.linspace(0.0, case.duration, PACE)
     angle = np.array(case.motion(time)[0], dtype=float)
     if angle.shape != time.shape or not np.isfinite(angle).all():
         return None

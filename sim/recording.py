@@ -22,7 +22,6 @@ import os
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 from pivoting.controller.solution import STATUS
 from pivoting.controller.solution_space import SolutionSpace
@@ -133,15 +132,11 @@ def _encoded(run: Run, world: int, rr: Any) -> bytes:
 
 def _solids(film: Film) -> None:
     """Table, body, and the paths of its contact points and CoM."""
-    rr, run, side = film.rr, film.run, film.side
+    rr, run = film.rr, film.run
     thin = rr.Radius.ui_points(1.0)
     film.still("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-    slab, at = side * np.array([2.0 if film.dim == 2 else 1.3, 0.5 if film.dim == 2 else 1.1, 0.03]), film.start
-    if film.dim == 3 and film.model.geom_type[run.truth.support] == mujoco.mjtGeom.mjGEOM_BOX:
-        slab, at = film.model.geom_size[run.truth.support], np.zeros(3)
     pose = rr.Transform3D(translation=run.truth.origin, quaternion=xyzw(run.truth.table))
-    top = rr.Boxes3D(centers=[at - slab * UP], half_sizes=[slab], colors=[TABLE], fill_mode="solid")
-    film.still("world/table", pose, top)
+    film.still("world/table", pose, _table(film))
     vertices, normals, lines = (np.concatenate(parts) for parts in zip(*film.solids, strict=True))
     if film.block:
         half = np.array([1.0, 0.0, 1.0]) * np.abs(vertices).max(axis=0) + [0.0, film.depth, 0.0]
@@ -157,6 +152,18 @@ def _solids(film: Film) -> None:
     film.send("world/block", rows, rr.Transform3D, translation=position, quaternion=xyzw(quaternion))
     for name, paths in (("com", position[None]), ("corner", np.moveaxis(film.corner[rows], 1, 0))):
         film.still(f"world/path/{name}", rr.LineStrips3D(paths + film.front, colors=[GREY], radii=thin))
+
+
+def _table(film: Film) -> Any:
+    """What the object stands on, in the table's frame: the whole geom, or, as planes have no end, a slab of it."""
+    rr, surface, style = film.rr, film.run.truth.surface, {"colors": [TABLE], "fill_mode": "solid"}
+    if film.dim == 2 or np.isinf(surface.thick):
+        slab = film.side * np.array([2.0, 0.5, 0.03] if film.dim == 2 else [1.3, 1.1, 0.03])
+        return rr.Boxes3D(centers=[film.start - slab * UP], half_sizes=[slab], **style)
+    middle = -0.5 * surface.thick * UP
+    if surface.disc:
+        return rr.Cylinders3D(centers=[middle], radii=[surface.half[0]], lengths=[surface.thick], **style)
+    return rr.Boxes3D(centers=[middle], half_sizes=[[*surface.half, 0.5 * surface.thick]], **style)
 
 
 def _wrench(film: Film) -> None:

@@ -372,6 +372,7 @@ class Run:
             "impratio": float(opt.impratio),
             "cone": mujoco.mjtCone(int(opt.cone)).name.removeprefix("mjCONE_").lower(),
             "replaced": dict(self.replaced),
+            "f_min_N": self.unit * float(self.attached.controller.belief.f_min.max()),
             **({} if self.settings is None else {key: getattr(self.settings, key) for key in _CHOSEN}),
         }
 

@@ -21,6 +21,8 @@ from pivoting.sim.keys import BOUND_KEYS, HIDDEN_KEYS, KEYS, LOWEST, RELATIVE_KE
 from pivoting.sim.relative import Load, absolute
 from pivoting.sim.verdict import Limits
 
+PACE = 2001  # times at which a motion is looked at, to see how far and how fast it goes
+
 
 @dataclass(frozen=True)
 class Scenario:
@@ -43,7 +45,8 @@ class Scenario:
             and after), "return" (an arc and back), "sine" (theta + amplitude sin, for seconds); from Python also any
             `Reference`, for seconds.
         law: of `controller.laws.FORMULATIONS`.  bandwidth [rad/s] (1/h of a quasi-dynamic law), damping: of the law.
-        margin: share of mu kept unused.  f_min: floor of each contact's normal force [N].
+        margin: share of mu kept unused.  f_min: floor of each contact's normal force [N]; None: what keeps the contact
+            closed as it turns, see `pace`.
         length: characteristic length of Q_w [m]; None: the lever of the contact.
         force_max [N], moment_max [N m], force_rate [N/s], moment_rate [N m/s]: bounds on the wrench, in object axes;
             None: none.
@@ -78,7 +81,7 @@ class Scenario:
     bandwidth: float = 40.0
     damping: float = 1.0
     margin: float = 1.0 / 6.0
-    f_min: float | str = 0.0
+    f_min: float | str | None = 0.0
     length: float | None = None
     force_max: float | str | None = None
     moment_max: float | str | None = None
@@ -210,6 +213,12 @@ class Scenario:
             key: absolute(key, value, KEYS[key].relative, of, KEYS[key].unit, KEYS[key].limits)
             for key, value in given.items()
         }
+
+    @property
+    def pace(self) -> tuple[Array, Array]:
+        """Times and the rates of turn at them, (N,) [s] and [rad/s], of a scenario whose motion is `absolute`."""
+        times = np.linspace(0.0, self.duration, PACE)
+        return times, np.array(self.motion(times)[1], dtype=float)
 
     def bounds(self, unit: float = 1.0) -> WrenchBounds:
         """On the wrench, of a scenario that is `absolute`; without any, one that bounds nothing.

@@ -39,6 +39,7 @@ def own_object(
         theta=5.0,
         theta_end=25.0,
         seconds=2.0,
+        f_min=None,
         limits=Limits(slip_m=None, angle_rms_deg=0.1, angle_max_deg=0.2, force_mismatch_rel=0.05, settle_s=0.1),
     )
 

@@ -1,9 +1,10 @@
 """Contacts that are not declared: refused at the start, and named when a run makes one."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
+from pivoting.models.body_contacts import forced
 from pivoting.models.naming import ModelError, label
 from pivoting.models.reading import RigidBody, initial_data
 
@@ -11,21 +12,10 @@ if TYPE_CHECKING:
     from pivoting.sim.run import Run
 
 
-def contacts_of(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> list[tuple[int, int, Any]]:
-    """(own geom, other geom, contact) of every contact of the body that makes a force, in `data` after mj_forward."""
-    out = []
-    for contact in data.contact:
-        first, second = (int(geom) for geom in contact.geom)
-        ends = [int(model.geom_bodyid[geom]) for geom in (first, second)]
-        if body in ends and contact.efc_address >= 0 and min(first, second) >= 0:
-            out.append((first, second, contact) if ends[0] == body else (second, first, contact))
-    return out
-
-
 def contact_margin(model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody) -> float:
     """How far from its support the body is held [m]: the margin of the contacts that `data` has."""
-    held = contacts_of(model, data, body.index)
-    return max((float(contact.includemargin) for _, other, contact in held if other == body.support), default=0.0)
+    held = forced(model, data, body.index, body.support)
+    return max((float(one.contact.includemargin) for one in held), default=0.0)
 
 
 def refuse_strays(model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody, unit: float = 1.0) -> None:
@@ -34,7 +24,7 @@ def refuse_strays(model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody, u
     Raises:
         ModelError: it does; both geoms are named.
     """
-    for own, other, contact in contacts_of(model, data, body.index):
+    for own, other, contact in forced(model, data, body.index):
         if other != body.support:
             deep = f"by {-1e3 * unit * float(contact.dist):.3g} mm" if contact.dist < 0.0 else "within its margin"
             told = f"where it starts, its geom {label(model, own)} is in {label(model, other)} {deep}"
@@ -60,7 +50,7 @@ def stray_words(run: "Run") -> list[str]:
         if strays[world, step]:
             mujoco.mj_forward(run.model, data)
             at = run.declared.touch(run.position[world, step], run.quaternion[world, step])
-            for own, other, contact in contacts_of(run.model, data, body):
+            for own, other, contact in forced(run.model, data, body):
                 away = run.declared.shares(np.array(contact.pos)[None], at)[1][0]
                 if other != run.truth.support or (away > run.declared.near and not run.declared.landing):
                     found.setdefault((own, other), float(run.time[step]))

@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
+from pivoting.models import candidates
 from pivoting.models.candidates import Stance, contact_points, stance, support_points
 from pivoting.models.reading import ModelError, matrix
 
@@ -349,3 +350,12 @@ def test_contacts_given_by_hand() -> None:
 def test_refusals(geoms: str, contact: object, words: str) -> None:
     with pytest.raises(ModelError, match=words):
         stance(model_of(geoms), 1, contact)
+
+
+def test_the_kind_that_was_refused_is_not_looked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However the word came about: one read from a command line is another object than the one compared with."""
+    asked: list[object] = []
+    monkeypatch.setattr(candidates, "search", lambda body, contact, *_: asked.append(contact) or iter(()))
+    with pytest.raises(ModelError, match="contact = 'edge'"):
+        stance(model_of(BODIES["box"]), 1, "".join(["ed", "ge"]))
+    assert asked == ["edge", "edge", "vertex"]  # what is asked for, with and without its arc; then a way out

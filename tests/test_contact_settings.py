@@ -149,4 +149,27 @@ def test_no_contact_changes_nothing() -> None:
         "</mujoco>"
     )
     chosen = contact_settings(model, 1, 0, [np.array([0, 0, 1.0, 1, 0, 0, 0])], 0.001)
-    assert chosen[:5] == pytest.approx((0.0021, 1.0, 0.5, 0, 0.0))
+    assert chosen[:6] == pytest.approx((0.0021, 1.0, 0.5, 0, 0.0, 0.0))
+
+
+LIGHT = '<inertial pos="0 0 0" mass="1" diaginertia="{0} {0} {0}"/><geom type="box" size=".2 .2 .015"/>'
+
+
+@pytest.mark.parametrize("inertia", [4e-3, 1e-3, 1e-4])
+def test_one_contact_of_a_body_of_little_inertia_holds(tmp_path: Path, inertia: float) -> None:
+    """A plate whose lever weighs 20 to 800 times its inertia: it rings no longer than a box does."""
+    run = turned(tmp_path, LIGHT.format(inertia), "vertex")
+    chosen, rows = settings(run), run.contact_rows
+    assert rows is not None
+    assert chosen.alone == chosen.coupling > COUPLED
+    assert (chosen.dampratio, chosen.impedance) == (1.0, 0.5)
+    share = chosen.alone / (chosen.alone + 1.0)
+    at_most = COUPLED / (COUPLED + 1.0) * (2.0 * 2.0 / (0.5 * 2.1) + 0.5 / (0.5 * 2.1) ** 2)
+    assert share * (2.0 * rows.b * rows.h + rows.k * 0.5 * rows.h**2) == pytest.approx(at_most)
+    assert 2.1 < chosen.timeconst / run.dt < 2.32
+    holds(run)
+
+
+def test_with_the_shipped_settings_it_diverges(tmp_path: Path) -> None:
+    run = turned(tmp_path, LIGHT.format(1e-3), "vertex", timeconst=0.0042)
+    assert "the object diverged" in run.summary()["reasons"][0]

@@ -15,6 +15,7 @@ from pivoting.sim.identity import digest
 from pivoting.sim.recording import record
 from scipy.spatial.transform import Rotation
 
+from tests.own_files import mjcf, pivoted
 from tests.recordings import one_each, read, steps
 
 RUNS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -196,3 +197,33 @@ def test_a_planar_object_of_ones_own_has_its_own_shape(tmp_path: Path) -> None:
     assert gaps.min(axis=1).max() < 1e-4
     front = one_each(entities["/world/wrench"]["Transform3D:translation"])[:, 1]
     assert (front < -0.08).all()
+
+
+TABLES = [
+    'type="box" size=".3 .2 .25" pos="0 0 -.3" euler="90 0 0"',
+    'type="box" size=".2 .3 .4" pos=".1 0 -.3" euler="0 90 25"',
+    'type="cylinder" size=".3 .1" pos=".05 0 -.2" euler="180 0 0"',
+]
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_a_table_is_drawn_where_mujoco_has_it(table: str, tmp_path: Path) -> None:
+    """A box on any of its sides, and a cylinder: corners, or axis and sizes, are those of geom_xpos and geom_xmat."""
+    run = pivoted(tmp_path, mjcf(floor=f'<geom name="t" {table}/>'), "vertex")
+    drawn = read(record(run, tmp_path / "table.rrd"))["/world/table"]
+    kind = "Boxes3D" if 'type="box"' in table else "Cylinders3D"
+    values = {name.split(":")[1]: column.to_pylist()[0] for name, column in drawn.items() if kind in name}
+    at, turn = (drawn[f"static Transform3D:{key}"].to_pylist()[0][0] for key in ("translation", "quaternion"))
+    turned, geom, data = Rotation.from_quat(turn), run.model.geom("t").id, mujoco.MjData(run.model)
+    mujoco.mj_kinematics(run.model, data)
+    axes, size = data.geom_xmat[geom].reshape(3, 3), run.model.geom_size[geom]
+    middle = at + turned.apply(values["centers"][0])
+    if kind == "Cylinders3D":
+        np.testing.assert_allclose(middle, data.geom_xpos[geom], atol=1e-6)
+        assert abs(turned.as_matrix()[:, 2] @ axes[:, 2]) == pytest.approx(1.0)
+        assert (values["radii"], values["lengths"]) == (pytest.approx([size[0]]), pytest.approx([2.0 * size[1]]))
+        return
+    signs = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
+    corners = middle + turned.apply(signs * values["half_sizes"][0])
+    gaps = np.linalg.norm(corners[:, None] - (data.geom_xpos[geom] + signs * size @ axes.T), axis=2)
+    assert max(gaps.min(axis=0).max(), gaps.min(axis=1).max()) < 1e-6

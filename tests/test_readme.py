@@ -69,6 +69,16 @@ def test_agreement_with_clarabel_is_the_committed_one() -> None:
     assert f"KKT residual {max(figures[name + 'greatest KKT residual'] for name in names):.1e}." in TEXT
 
 
+def test_what_came_of_the_objects_is_the_committed_outcome() -> None:
+    figures = json.loads((ROOT / "benchmarks/results/objects.json").read_text())["figures"]
+    runs, passed, failed, refused = (f"{figures[name]:.0f}" for name in ("runs", "pass", "fail", "refused"))
+    words = " ".join(TEXT.split())
+    assert f"{figures['objects']:.0f} bodies and meshes" in words
+    assert f"Of {runs} runs {passed} pass, {failed} fail and {refused} are refused, " in words
+    share = figures["share that passes where there is such a contact"]
+    assert f"finds such a contact {100.0 * share:.0f} % pass" in words
+
+
 @pytest.mark.parametrize("study", ["formulations", "effort"])
 def test_the_studys_tables_are_those_of_its_results(study: str) -> None:
     benchmarks = ROOT / "benchmarks"
@@ -84,7 +94,7 @@ def test_the_studys_tables_are_those_of_its_results(study: str) -> None:
 
 
 def test_recorded_evidence_is_within_its_bounds() -> None:
-    for name in ("evidence", "evidence_space", "loop", "formulations", "effort"):
+    for name in ("evidence", "evidence_space", "loop", "formulations", "effort", "objects"):
         saved = json.loads((ROOT / f"benchmarks/results/{name}.json").read_text())
         assert saved["quick"] is False
         assert {"processor", "cores", "python", "versions"} <= set(saved["machine"])

@@ -64,7 +64,7 @@ def test_rates_are_per_second() -> None:
     assert np.linalg.norm(rate[:, :2], axis=1).max() <= 50.0 * (1.0 + 1e-6)
 
 
-@pytest.mark.parametrize("change", [{"mass": 100.0}, {"mass": 0.01}, {"gravity": 1.62}, {"gravity": 24.8}], ids=str)
+@pytest.mark.parametrize("change", [{"mass": 1e10}, {"mass": 0.01}, {"gravity": 1.62}, {"gravity": 24.8}], ids=str)
 @pytest.mark.parametrize("name", ["snap-2d", "mpc-2d"])
 def test_mass_and_gravity_may_change(name: str, change: dict[str, float], shipped: Callable[[str], Run]) -> None:
     """What is asked of the contact scales with the weight; of another mass it is the same to rounding."""

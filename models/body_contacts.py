@@ -1,0 +1,32 @@
+"""The contacts that MuJoCo has found between a body and what is around it."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import mujoco
+
+
+class BodyContact(NamedTuple):
+    """A contact of a body: ids of its own geom and of the other, and the contact itself."""
+
+    own: int
+    other: int
+    contact: Any
+
+
+def contacts_of(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> Iterator[BodyContact]:
+    """Every contact of a body that `data` lists, those within a gap, which make no force, included."""
+    for contact in data.contact:
+        first, second = (int(geom) for geom in contact.geom)
+        if min(first, second) < 0:  # of a flex
+            continue
+        if int(model.geom_bodyid[first]) == body:
+            yield BodyContact(first, second, contact)
+        elif int(model.geom_bodyid[second]) == body:
+            yield BodyContact(second, first, contact)
+
+
+def forced(model: mujoco.MjModel, data: mujoco.MjData, body: int, other: int | None = None) -> list[BodyContact]:
+    """Those that make a force, with any geom or with one `other`, such as the support, after mj_fwdPosition."""
+    found = contacts_of(model, data, body)
+    return [one for one in found if one.contact.efc_address >= 0 and other in (None, one.other)]
