@@ -7,11 +7,13 @@ of slices brings the code of its error message along, with text and lists), all 
 problem does not need is None, whose branches are left out.
 """
 
-from collections.abc import Callable
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from numba import guvectorize, njit
+from numba import njit
 from numba.extending import register_jitable
 
 
@@ -33,6 +35,14 @@ kernel = njit(cache=CACHED, **_common)
 subroutine = register_jitable(no_cpython_wrapper=True, **_common)
 
 
-def elementwise(layout: str) -> Callable[..., Any]:
-    """A decorator: two float arrays and an output, broadcast over all axes but those that `layout` names."""
-    return guvectorize(["void(f8[:], f8[:], f8[:])"], layout, cache=CACHED)
+@contextmanager
+def first_calls() -> Iterator[None]:
+    """Around calls that may compile: numba makes objects by the million, and looking for garbage among them costs it a
+    tenth of its time."""
+    collected = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collected:
+            gc.enable()

@@ -1,8 +1,9 @@
 """Small turns: what linearises rotations, compiled, and turning by rotation vectors (Sola et al. 2018)."""
 
 import numpy as np
-from pivoting.controller.kernel import elementwise, kernel, subroutine
-from pivoting.controller.space import fill_product, rotation_error
+from numpy.typing import ArrayLike
+from pivoting.controller.kernel import kernel, subroutine
+from pivoting.controller.space import components, fill_product, rotation_error, stacked
 from pivoting.controller.validate import Array
 
 _SMALL = 1e-4  # [rad]: below, the series is more accurate than the quotient
@@ -20,15 +21,11 @@ def turn(orientation, vector, out):  # type: ignore[no-untyped-def]
         out[i] /= length
 
 
-@elementwise("(q),(v)->(v)")
-def rotated(orientation, point, out):  # type: ignore[no-untyped-def]
+def rotated(orientation: ArrayLike, point: ArrayLike) -> Array:
     """(..., 3) points turned by unit quaternions (..., 4), shapes broadcast."""
-    w, a, b, c = orientation[0], orientation[1], orientation[2], orientation[3]
-    x, y, z = point[0], point[1], point[2]
+    (w, a, b, c), (x, y, z) = components(orientation), components(point)
     t, u, v = 2.0 * (b * z - c * y), 2.0 * (c * x - a * z), 2.0 * (a * y - b * x)  # twice axis x point
-    out[0] = x + w * t + b * v - c * u
-    out[1] = y + w * u + c * t - a * v
-    out[2] = z + w * v + a * u - b * t
+    return stacked([x + w * t + b * v - c * u, y + w * u + c * t - a * v, z + w * v + a * u - b * t])
 
 
 def exponential(vector: Array) -> Array:

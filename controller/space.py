@@ -7,11 +7,11 @@ Planar coordinates are (x right, z up), the angle theta counter-clockwise, that 
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.kernel import elementwise, kernel, subroutine
+from pivoting.controller.kernel import kernel, subroutine
 from pivoting.controller.validate import Array, array, fail, unit_quaternions
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
@@ -121,10 +121,22 @@ def fill_product(p, q, out):  # type: ignore[no-untyped-def]
     out[0], out[1], out[2], out[3] = w, x, y, z
 
 
-@elementwise("(q),(q)->(q)")
-def quaternion_product(p, q, out):  # type: ignore[no-untyped-def]
+def components(vectors: ArrayLike) -> list[Any]:
+    """The components of vectors (..., n): n arrays (...), or n floats of one vector, with which Python is faster."""
+    array = np.asarray(vectors, dtype=float)
+    return array.tolist() if array.ndim == 1 else [array[..., i] for i in range(array.shape[-1])]
+
+
+def quaternion_product(p: ArrayLike, q: ArrayLike) -> Array:
     """Hamilton product of (..., 4) quaternions (w, x, y, z), shapes broadcast."""
-    fill_product(p, q, out)
+    out: list[Any] = [0.0] * 4
+    fill_product(components(p), components(q), out)
+    return stacked(out)
+
+
+def stacked(values: list[Any]) -> Array:
+    """(..., n) of n components (...)."""
+    return np.array(values) if isinstance(values[0], float) else np.stack(values, axis=-1)
 
 
 @kernel

@@ -1,8 +1,9 @@
 """Checks of what users hand in: one error that names the argument, its value and what is allowed."""
 
+from math import hypot
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pivoting.controller.kernel import kernel
 
 Array = NDArray[np.float64]
 
@@ -43,18 +44,10 @@ def _shown(shape: tuple[int | None, ...]) -> str:
 def unit_quaternions(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
     """The same for quaternions of unit length, the last axis of `shape`, to 1e-6."""
     out = array(name, value, shape)
-    if _off_unit(out.reshape(-1, 4)) > 1e-6:
+    length = np.array(hypot(*out.tolist())) if out.ndim == 1 else np.linalg.norm(out, axis=-1)
+    if np.abs(length - 1.0).max(initial=0.0) > 1e-6:
         raise fail(name, out, "a unit quaternion (w, x, y, z)" + (" in each row" if out.ndim > 1 else ""))
     return out
-
-
-@kernel
-def _off_unit(q):  # type: ignore[no-untyped-def]
-    worst = 0.0
-    for i in range(q.shape[0]):
-        length = np.sqrt(q[i, 0] ** 2 + q[i, 1] ** 2 + q[i, 2] ** 2 + q[i, 3] ** 2)
-        worst = max(worst, abs(length - 1.0))
-    return worst
 
 
 def number(

@@ -1,6 +1,6 @@
 """What decides on the wrenches of a step, for all worlds: a law on a reference, a receding horizon, a plan played."""
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,20 @@ class States(NamedTuple):
     orientation: Array
     velocity: Array
     angular_velocity: Array
+
+    @classmethod
+    def turning(cls, orientation: Array, angular_velocity: Array) -> Self:
+        """Of worlds about whose positions nothing is asked; read-only, as what MuJoCo gives, because the compiled loop
+        is compiled anew for arrays of another kind."""
+        values = (
+            np.zeros((len(orientation), 3)),
+            orientation.copy(),
+            np.zeros((len(orientation), 3)),
+            angular_velocity.copy(),
+        )
+        for array in values:
+            array.flags.writeable = False
+        return cls(*values)
 
 
 class Answers(NamedTuple):

@@ -9,6 +9,7 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 from pivoting.controller.controller import WrenchController
+from pivoting.controller.kernel import first_calls
 from pivoting.controller.rotations import Turn
 from pivoting.controller.so3 import exponential
 from pivoting.controller.space import quaternion_product, space
@@ -223,10 +224,11 @@ def _pressed(model: mujoco.MjModel, plan: Plan, orientations: Array) -> Iterator
 
 def _load(controller: WrenchController, law: LawControl, told: Samples) -> float:
     """The normal force [N] on all contacts with which the law begins."""
-    states = States(np.zeros((1, 3)), told[0][:1], np.zeros((1, 3)), told[1][:1])
+    states = States.turning(told[0][:1], told[1][:1])
     nw, d, K = len(controller.Q_w), controller.space.dim, len(controller.contacts)
     out = Answers(np.empty((1, nw)), np.empty((1, nw)), np.empty((1, K * d)), np.empty(1), np.empty(1, np.int8))
-    law(0, states, None, out)
+    with first_calls():
+        law(0, states, None, out)
     return float(out.force.reshape(K, d)[:, -1].sum())
 
 

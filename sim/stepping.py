@@ -9,6 +9,7 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 from pivoting.controller.controller import WrenchController, world_wrench
+from pivoting.controller.kernel import first_calls
 from pivoting.models.contact_rows import ContactRows
 from pivoting.sim.contact_readings import FIELDS, ContactReadings, Declared, list_contacts, read_contacts
 from pivoting.sim.control import Answers, Control, States
@@ -110,8 +111,9 @@ def run_steps(
     )
     wrench_world, spent = np.empty((steps, worlds, 6)), np.empty(steps)
     block = np.empty((max(1, min(steps, BLOCK // worlds)), *sensordata.shape))
-    control.prepare(states, Answers(*(values[0] for values in out)))  # compiled before it is timed
-    world_wrench(belief.wrench_map, states.orientation, out.wrench[0], wrench_world[0])
+    with first_calls():  # compiled before it is timed
+        control.prepare(states, Answers(*(values[0] for values in out)))
+        world_wrench(belief.wrench_map, states.orientation, out.wrench[0], wrench_world[0])
     kept[0] = sensordata[:, : pose.stop]
     report, first = max(1, steps // 100), 0
     start = perf_counter()

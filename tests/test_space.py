@@ -3,13 +3,14 @@
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pivoting.controller.space import Motion, quaternion_product, rotation_error, rotation_matrix, space, tilt
 
 unit = st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 0.1)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(unit, unit)
 def test_quaternions_against_mujoco(p: list, q: list) -> None:
     a, b = np.array(p) / np.linalg.norm(p), np.array(q) / np.linalg.norm(q)
@@ -20,6 +21,7 @@ def test_quaternions_against_mujoco(p: list, q: list) -> None:
     np.testing.assert_allclose(rotation_matrix(a), matrix.reshape(3, 3), atol=1e-12)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(unit, unit)
 def test_rotation_error_against_mujoco(p: list, q: list) -> None:
     """mju_subQuat(b, a) is the rotation, in a's axes, that turns a into b; its length is at most pi."""
