@@ -30,6 +30,7 @@ latest:  ## the newest of every dependency in place of the lock, in .venv-latest
 	NUMBA_CACHE_DIR=$(CURDIR)/.venv-latest/kernels .venv-latest/bin/python $(TESTS)
 
 bench: .venv/.peers  ## timings, against peers (the extra [bench], 300 MB), into benchmarks/results
+	$(BIN)/python benchmarks/bench_compile.py --json benchmarks/results/compile.json
 	$(BIN)/python benchmarks/bench_loop.py --json benchmarks/results/loop.json
 	$(BIN)/python benchmarks/bench_solve.py --json benchmarks/results/solve.json
 	$(BIN)/python benchmarks/bench_horizon.py --json benchmarks/results/horizon.json

@@ -111,8 +111,8 @@ def _reasons(case: _Case) -> Iterator[str]:
         k = case.let_go
         lost = float(run.measures.contact_lost_s[i])
         when = f"at {run.time[k]:.3g} s ({theta[k]:.3g} deg), for {lost:.3g} s in all"
-        push = f"{case.least_push:.3g} N of push, {case.least_push / max(case.weight, 1e-300):.2g} weights"
-        yield f"the contact let go {when}: the answers count on as little as {push}"
+        push = f"{case.least_push:.3g} N, {case.least_push / max(case.weight, 1e-300):.2g} weights"
+        yield f"the contact let go {when}: it was meant to press with only {push}"
     elif case.failed("contact_lost_s"):
         yield "one of the contacts left the table"
     if case.slid is not None and (case.failed("slip_max_m") or case.failed("friction_use_max")):

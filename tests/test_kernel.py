@@ -1,0 +1,77 @@
+"""What makes compiling slow is not written: see `pivoting.controller.kernel`."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numba.core.errors import NumbaError
+from pivoting.controller import kernel as module
+from pivoting.controller.kernel import kernel
+
+COMPILED = ("kernel", "subroutine")
+BLOCK = """<mujoco><worldbody><geom type="plane" size="2 2 .1"/><body name="block" pos="0 0 .1"><freejoint/>
+<geom type="box" size=".1 .07 .1" mass="1"/></body></worldbody></mujoco>"""
+PLAIN = {"sqrt", "hypot", "isfinite", "isnan", "inf", "nan", "sin", "cos", "tan", "arctan2"}  # of NumPy
+
+
+def compiled(source: str) -> Iterator[ast.FunctionDef]:
+    """Its functions that numba compiles."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef):
+            names = {decorator.id for decorator in node.decorator_list if isinstance(decorator, ast.Name)}
+            if names & set(COMPILED):
+                yield node
+
+
+def slow(function: ast.FunctionDef) -> list[str]:
+    """What of it brings much else along: whole arrays made, copied, or computed with."""
+    found = []
+    for node in ast.walk(function):
+        if isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store):
+            parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+            if any(isinstance(part, ast.Slice) for part in parts):
+                found.append(f"{function.name}, line {node.lineno}: a slice is assigned to")
+        of_numpy = isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "np"
+        if of_numpy and node.attr not in PLAIN:
+            found.append(f"{function.name}, line {node.lineno}: np.{node.attr}")
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in ("sum", "copy"):
+            found.append(f"{function.name}, line {node.lineno}: .{node.func.attr}()")
+    return found
+
+
+@pytest.mark.parametrize("path", sorted(Path(module.__file__).parent.glob("*.py")), ids=lambda path: path.stem)
+def test_kernels_allocate_nothing_and_copy_in_loops(path: Path) -> None:
+    assert [said for function in compiled(path.read_text()) for said in slow(function)] == []
+
+
+def test_what_is_looked_for_is_found() -> None:
+    text = "@kernel\ndef f(a, b):\n    a[:] = b\n    a[1, 2:] = b.sum()\n    return np.empty(3) + np.sqrt(2.0)"
+    (function,) = compiled(text)
+    assert len(slow(function)) == 4
+
+
+def test_a_kernel_that_allocates_is_refused() -> None:
+    with pytest.raises(NumbaError, match="NRT required"):
+        kernel(lambda: np.empty(3)[0])()
+
+
+LOOPS = """
+from pivoting.controller.controller import step_worlds
+from pivoting.sim import own_object, simulate
+simulate("spin-3d")
+simulate(own_object({path!r}, "block", "vertex"))
+print(len(step_worlds.signatures))
+"""
+
+
+def test_one_compiled_loop_serves_a_scenario_and_an_object_of_ones_own(tmp_path: Path) -> None:
+    """Arrays of another layout, or read-only ones, would have everything compiled again."""
+    (path := tmp_path / "block.xml").write_text(BLOCK)
+    done = subprocess.run(
+        [sys.executable, "-c", LOOPS.format(path=str(path))], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["1"]
