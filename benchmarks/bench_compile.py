@@ -1,7 +1,7 @@
 """How long a first run waits for the compiler: every scenario in a process of its own, with nothing compiled before.
 
-Seconds of the whole command, `pivoting run NAME --json`, with an empty cache less the same with a full one; of three
-runs the least, because a machine is rarely idle. What is asked is of two idle cores.
+Seconds of the whole command, `pivoting run NAME --json`, with an empty cache less the same with a full one: the least
+of three runs, since a machine is rarely idle. The bounds are for two idle cores.
 """
 
 import os

@@ -196,7 +196,7 @@ def _dofs(model: mujoco.MjModel, body: int) -> slice:
 
 
 def claims(facts: Facts, limits: dict[str, float], lever: float) -> dict[str, bool]:
-    """By how a reason begins, as a pattern, whether the facts bear it out.
+    """For each reason, given as a pattern of how it begins: do the facts confirm it?
 
     Args:
         limits: of the run's verdict.

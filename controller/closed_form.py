@@ -116,7 +116,7 @@ def balancing_wrench(J, b, f, w):  # type: ignore[no-untyped-def]
 
 @kernel
 def planar_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no-untyped-def]
-    """The smallest wrench with one contact in the plane; see `contact_wrench`."""
+    """As `contact_wrench`, for one contact in the plane.  scratch: the values of a `Reduced`."""
     work = Reduced(*scratch)
     reduce(J, b, Q_w, Q_f, work.H, work.h, work.x)
     planar_force(work.H, work.h, mu[0], f_min[0], f)

@@ -241,7 +241,7 @@ def kkt_residual(program: ConicProgram, x: Array, z: Array) -> float:
 def _residual(  # type: ignore[no-untyped-def]
     P, P_row, P_column, A, A_row, A_column, q, b, zero, linear, orders, x, z, curved, pull, s, terms
 ):
-    """The same; P x, A'z, b - A x and |A||x| are summed up in the last four, which are 0, 0, b and 0."""
+    """As `kkt_residual`. The last four are scratch: on entry 0, 0, b and 0; on return P x, A'z, b - A x and |A||x|."""
     n, m = q.shape[0], b.shape[0]
     for j in range(n):
         for k in range(P_column[j], P_column[j + 1]):
@@ -267,8 +267,7 @@ def _residual(  # type: ignore[no-untyped-def]
         slope += q[j] * x[j]
     primal, dual, stationary = primal / largest_term, dual / largest_z, stationary / scale
     gap = abs(gap) / max(1.0, 0.5 * abs(curve) + abs(slope))
-    # comparisons with nan would hide it: what is not finite in x or z makes these sums so
-    finite = np.isfinite(curve + slope + gap + primal + dual)
+    finite = np.isfinite(curve + slope + gap + primal + dual + stationary)  # comparisons with nan hide it
     return max(max(primal, dual), max(stationary, gap)) if finite else np.nan
 
 

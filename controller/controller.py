@@ -189,7 +189,7 @@ class WrenchController:
     def _stated(self, measured: tuple[Array, ...], desired: tuple[Array, ...]) -> tuple[Array, Array]:
         """J (nw, K d) and the required wrench (nw,) at q, omega for q_d, omega_d, alpha_d, all in world axes."""
         J, required = np.empty((len(self.Q_w), len(self.Q_f))), np.empty(len(self.Q_w))
-        # read-only or not as in the loop: numba would compile everything again
+        # writable or read-only as in the loop, so that numba need not compile a second variant
         seen, wanted = [np.array(values) for values in measured], [np.array(values) for values in desired]
         for values in seen:
             values.flags.writeable = False
@@ -273,7 +273,7 @@ def step_worlds(  # type: ignore[no-untyped-def]
                 break
             next_multiplier(root, size)
             multiplier = root[0]
-            if attempt >= ATTEMPTS - 1 or multiplier > HEAVIEST * root[5]:  # out of reach: as without bounds
+            if attempt >= ATTEMPTS - 1 or not multiplier <= HEAVIEST * root[5]:  # out of reach: as without bounds
                 ball = -1
         if not np.isfinite(residual[i]):
             status[i] = FAILED

@@ -26,8 +26,8 @@ EXACT = 1e-13  # relative KKT residual at which nothing is left to improve
 def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no-untyped-def]
     """Write the optimal contact forces f (n,) and wrench w (nw,), and return their relative KKT residual.
 
-    One contact in space is solved in closed form, and polished where that does not suffice; several, or what is still
-    not exact, by the interior point. Bounded in time; all nan where the problem is not finite.
+    One contact in space is solved in closed form and, if that is not exact, polished. Several contacts, and what is
+    then still not exact, go to the interior point. Bounded in time; all nan where there is no finite answer.
 
     Args:
         J: (nw, n); b: (nw,) [N, N m]; Q_w: (nw, nw); Q_f: (n, n); mu (planned), f_min [N]: (K,).
@@ -38,11 +38,11 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no
     size = reduce(J, b, Q_w, Q_f, work.H, h, work.x)
     for i in range(K):
         size += mu[i] + f_min[i]
+    for i in range(n):
+        f[i] = np.nan
+    for i in range(w.shape[0]):
+        w[i] = np.nan
     if not np.isfinite(size):
-        for i in range(n):
-            f[i] = np.nan
-        for i in range(w.shape[0]):
-            w[i] = np.nan
         return np.nan
     if n == 3:  # exact up to eps cond(H): most problems need no more
         best = _closed_form(J, b, Q_w, Q_f, mu, f_min, f, w, work)
@@ -86,7 +86,7 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no
         gap, left, size = _advance(mu, f_min, axes, alpha, work)
     if best > EXACT:
         best = _try(J, b, Q_w, Q_f, mu, f_min, axes, 0, f, w, best, work)
-    return best
+    return best if best < np.inf else np.nan
 
 
 @subroutine
@@ -96,7 +96,8 @@ def _closed_form(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-unty
     balancing_wrench(J, b, f, w)
     for i in range(3):
         work.now[i] = f[i]
-    return kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, work.pull)
+    residual = kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, work.pull)
+    return residual if np.isfinite(residual) else np.inf  # of an H that rounding made indefinite
 
 
 @subroutine

@@ -1,10 +1,10 @@
-"""How functions are compiled: `kernel`, which Python calls, and `subroutine`, which only kernels call.
+"""How functions are compiled: `kernel`, with an entry from Python, and `subroutine`, which kernels call.
 
-Compiling is what a new user waits for, and most of it is numba's own work in Python and the code of callees, which is
-optimised again in each caller. So kernels neither allocate nor count references (scratch is handed in, and no array is
-returned), subroutines have no entry from Python and are compiled only once, arrays are copied in loops (an assignment
-of slices brings the code of its error message along, with text and lists), all arrays are contiguous, and what a
-problem does not need is None, whose branches are left out.
+A new user waits for the compiler. Most of its time goes into numba's own Python code, and into callees, which are
+optimised again in every caller. Hence: kernels get their scratch from outside, return no arrays and count no
+references; subroutines have no compiled entry from Python, where they are plain functions; arrays are copied in loops,
+because assigning to a slice also compiles the text of its error message; all arrays are contiguous; and what a problem
+does not need is None, so that its branch is left out.
 """
 
 import gc
@@ -37,8 +37,8 @@ subroutine = register_jitable(no_cpython_wrapper=True, **_common)
 
 @contextmanager
 def first_calls() -> Iterator[None]:
-    """Around calls that may compile: numba makes objects by the million, and looking for garbage among them costs it a
-    tenth of its time."""
+    """Keep the garbage collector off during calls that may compile: numba makes millions of objects, and searching them
+    takes a tenth of the time."""
     collected = gc.isenabled()
     gc.disable()
     try:

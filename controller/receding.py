@@ -109,16 +109,8 @@ def followed_motion(followed: Followed, state: BodyState, times: Array) -> tuple
     begun = quaternion_product(plan.horizon.controller.base, plan.guess.path.before[3:])
     accelerated = INTEGRATORS[plan.horizon.integrator][0] == 2
     out = np.empty((len(times), 4)), np.empty((len(times), 3)), np.empty((len(times), 3))
-    _follow(
-        begun,
-        plan.angular_velocity,
-        accelerated,
-        plan.horizon.h,
-        followed.since + times,
-        np.empty((3, 3)),
-        np.empty(3),
-        *out,
-    )
+    scratch, at = (np.empty((3, 3)), np.empty(3)), followed.since + times
+    _follow(begun, plan.angular_velocity, accelerated, plan.horizon.h, at, *scratch, *out)
     return out
 
 

@@ -71,7 +71,10 @@ class Motion(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Of the rows of a horizon. turns: (8, 3, 3).  poses: (5, 6).  blocks: (6, 6, 6)."""
+    """Scratch for `fill_rows`, `fill_tracking` and `fill_corrected`.
+
+    turns: (8, 3, 3).  poses: (5, 6).  blocks: (4, 6, 6).
+    """
 
     turns: Array
     poses: Array
@@ -79,8 +82,8 @@ class Scratch(NamedTuple):
 
     @classmethod
     def empty(cls) -> Self:
-        """Room for them."""
-        return cls(np.empty((8, 3, 3)), np.empty((5, 6)), np.empty((6, 6, 6)))
+        """A new one, not initialised."""
+        return cls(np.empty((8, 3, 3)), np.empty((5, 6)), np.empty((4, 6, 6)))
 
 
 @kernel

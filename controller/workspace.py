@@ -10,7 +10,7 @@ P, Q, DP, DQ, C = 0, 1, 2, 3, 4  # columns of `Work.floor`
 
 
 class Reduced(NamedTuple):
-    """Of one contact in the plane, n = 2.
+    """Scratch for one contact in the plane, n = 2.
 
     H: (n, n) and h: (n,) of the problem in f alone.  x: (n,).  pull: (2, nw), Q_w w and |Q_w||w|.
     """
@@ -22,9 +22,9 @@ class Reduced(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Of K contacts otherwise, n = K d; handed around whole."""
+    """Scratch for all other problems: K contacts, n = K d."""
 
-    axes: tuple[int, ...]  # d of them, a number that the compiler knows
+    axes: tuple[int, ...]  # (0, ..., d - 1): its length makes d a constant when compiled
     H: Array  # (n, n) and (n,): the problem in f alone
     h: Array
     M: Array  # (n, n): the matrix being factored

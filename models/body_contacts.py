@@ -27,6 +27,6 @@ def contacts_of(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> Iterat
 
 
 def forced(model: mujoco.MjModel, data: mujoco.MjData, body: int, other: int | None = None) -> list[BodyContact]:
-    """Those that make a force, with any geom or with one `other`, such as the support, after mj_fwdPosition."""
+    """The contacts of a body that make a force, with any geom or only with `other`; call after mj_fwdPosition."""
     found = contacts_of(model, data, body)
     return [one for one in found if one.contact.efc_address >= 0 and other in (None, one.other)]

@@ -59,8 +59,9 @@ def stance(
 ) -> Stance:
     """How to pivot a body about a contact.
 
-    "vertex" and "edge" are the first that allow the arc: of the face on which it rests with its CoM lowest, then of the
-    others. "lowest" is what touches the table in the orientation that it has; of a face, an edge, or else a vertex.
+    "vertex" and "edge" are the first that allow the arc: of the face on which it lies in the orientation that it has,
+    then of that on which it rests with its CoM lowest, then of the others. "lowest" is what touches the table in that
+    orientation; of a face, an edge, or else a vertex.
     Given corners, or a point of a rim: at theta = 0 it lies on that face of theirs on which its CoM is lowest, one on
     which it rests if there is one, of those on which they allow the arc. Of several edges or vertices of a face, the
     CoM is closest to the one chosen, among those above which it can be brought.
@@ -98,6 +99,10 @@ def stance(
         return replace(one, face=_down(body, one))
     if not reason:
         first = next(search(body, contact, None, now, shown), None)
+        if first is not None and not isinstance(
+            contact, str
+        ):  # of its faces, that from which it can be turned farthest
+            first = max(search(body, contact, None, now, shown), key=lambda one: one.range[1])
         if alternating is not None:
             reason = not_held(body, contact, alternating, shown)
         elif first is not None and arc is not None:
@@ -150,7 +155,7 @@ def planar_stance(
 
 
 def _chosen(found: Iterable[Stance], gripped: Gripped | None) -> tuple[Stance | None, Stance | None]:
-    """The first that is held firmly, or else as well as any; and the first that is not held."""
+    """The stance that is held best, the first of equals; and the first that alternates."""
     first: dict[Grip, Stance] = {}
     for tried, one in enumerate(found):
         how = Grip.FIRM if gripped is None else gripped(one)
@@ -189,5 +194,6 @@ def _way_out(
         return f"; nearest: {option(value)}, within {within(asked, one.range[1])}"
     one = _chosen(sorted(widest(body), key=lambda one: -one.range[1]), gripped)[0]
     if one is not None:
-        return f"; widest: {option(written(one.points, shown))}, within {within(asked, one.range[1])}"
+        value = option(written(one.points, shown))
+        return f"; nothing of it allows that; widest: {value}, within {within(asked, one.range[1])}"
     return ""

@@ -1,10 +1,11 @@
-"""How soft the chosen contacts are: as in settings.xml, or softer where many hold one body, or one a light-footed one.
+"""How soft the chosen contacts are: as in settings.xml, or softer where many contacts hold a body, or where one is far
+from the centre of mass of a body of little inertia.
 
 MuJoCo makes each contact as soft as is right for a body's mass alone: R = (1 - d) / d D, with D its inverse. What the
 contacts of a body have together is the inverse inertia A = J M^-1 J' between all of them. Where an eigenvalue of it is
 c D, they give way there by the share c / (c + (1 - d) / d) of their reference, and a step of that is stable only while
 share (2 b h + k d h^2) < 4. Up to a c of 9 the settings are those of settings.xml. Where many contacts make it greater,
-the `coupling`, (1 - d) / d grows with their number, and timeconst and dampratio such that b and k stay. Where one alone
+the `coupling`, (1 - d) / d grows with it, and timeconst and dampratio such that b and k d stay. Where one alone
 does, far from the CoM of a body of little inertia, timeconst grows until share (2 b h + k d h^2) is that of 9. (If that
 one gave way more, the force that the law counts on would be off by more, which turns a light body at once: contact and
 law together would ring until they diverge.) docs/fidelity.md derives and measures it.
@@ -68,13 +69,14 @@ def contact_settings(
         coupling = max(coupling, _normal_coupling(A, impratio))
         each = (slice(i, i + 3) for i in range(0, len(A), 3))
         alone = max([alone, *(_normal_coupling(A[one, one], impratio) for one in each)])
-    one = max(COUPLED, alone)
-    ratio = max(1.0, coupling / one)
+    reference = max(COUPLED, alone)
+    ratio = max(1.0, coupling / reference)
     impedance = IMPEDANCE / (IMPEDANCE + (1.0 - IMPEDANCE) * ratio)
     softer = impedance / IMPEDANCE
-    steps = 2.0 / (np.sqrt(16.0 + 2.0 * RINGING * (one + 1.0) / one) - 4.0)  # 8 / steps + 2 / steps^2 = ringing / share
+    # 8 / steps + 2 / steps^2 = ringing / share
+    steps = 2.0 / (np.sqrt(16.0 + 2.0 * RINGING * (reference + 1.0) / reference) - 4.0)
     told = f"{contacts} contact{'s' * (contacts != 1)} at once, {coupling:.3g} times as stiff as one on the body alone"
-    softened = ratio > 1.0 or one > COUPLED
+    softened = ratio > 1.0 or reference > COUPLED
     return ContactSettings(
         timeconst=float(steps) * dt / softer,
         dampratio=float(np.sqrt(softer)),

@@ -1,4 +1,4 @@
-"""The faces that a body can lie on, out of its hull: those on which it rests first, and of these the lowest CoM."""
+"""The faces that a body can lie on, out of its hull: that on which it lies, then those on which it rests."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -9,6 +9,7 @@ from pivoting.models.frames import Array
 from pivoting.models.hull import Hull, Indices, outline
 from pivoting.models.naming import ModelError
 
+SAME = 1e-9  # 1 - cos of the angle between the normals of one face
 SLACK = 0.9  # of a range asked for: a bound is of facets that were merged within a tolerance
 
 
@@ -37,16 +38,20 @@ def face(body: Hull, up: Array) -> Face | None:
     return Face(up, points, owner, around) if body.lies(owner[around]) else None
 
 
-def faces(body: Hull, some: Indices | NDArray[np.bool_]) -> Iterator[Face]:
+def faces(body: Hull, some: Indices | NDArray[np.bool_], now: Array | None = None) -> Iterator[Face]:
     """The faces that `some` of the hull's facets are of, as they are asked for.
 
-    First those on which the body rests, then by the CoM's height, then the most up.
+    First that on which it lies now, on a table of normal `now` (3,), if it lies on any; then those on which it rests;
+    of these, and of the others, by the CoM's height, then the most up.
     """
+    lies = None if now is None else face(body, now)
+    if lies is not None:
+        yield lies
     ups, height = _planes(body, np.arange(len(body.ups))[some])
     tipping = []
     for k in np.lexsort((*-np.round(ups, 6).T, height)):
         one = face(body, ups[k])
-        if one is None:
+        if one is None or (lies is not None and one.up @ lies.up > 1.0 - SAME):
             continue
         if height[k] > 0.0 and _above(one.points[one.around], one.up, body):
             yield one

@@ -30,8 +30,8 @@ STEP = np.deg2rad(1.0)  # of an arc, or a range, at which it is asked: between t
 class Grip(Enum):
     """How the simulator holds a contact, the best first.
 
-    An edge with two contacts, whichever of its ends is the deeper one; with two only while a certain one is; with other
-    corners that touch as well, as the contact is soft; or an edge with one contact at a time.
+    FIRM: an edge has two contacts, whichever end is deeper. ONE_SIDED: two only while a particular end is the deeper
+    one. CROWDED: other corners touch too, because the contact is soft. ALTERNATING: one contact at a time.
     """
 
     FIRM = "firm"

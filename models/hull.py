@@ -199,7 +199,7 @@ def body_size(model: mujoco.MjModel, index: int) -> float:
 
 
 def _diagonal(centre: Array, axes: Array) -> float:
-    """Of the box around some ellipsoids c + A x."""
+    """Diagonal of the box around ellipsoids c + A x [m]."""
     reach = np.linalg.norm(axes, axis=2)
     return float(np.linalg.norm((centre + reach).max(axis=0) - (centre - reach).min(axis=0)))
 

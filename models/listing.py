@@ -11,7 +11,7 @@ from pivoting.models.frames import matrix
 from pivoting.models.given import Shown, as_compiled, written
 from pivoting.models.grip import Grip, grip
 from pivoting.models.hull import Hull, read_hull
-from pivoting.models.reading import RigidBody
+from pivoting.models.reading import RigidBody, initial_data
 from pivoting.models.search import about, aside, of_no_face, on_face, spots
 from pivoting.models.tilt import LEAST, Stance
 
@@ -22,7 +22,7 @@ class Candidate(NamedTuple):
     Attributes:
         kind: "vertex", "rim", "round end" or "edge".
         contact: as `--contact` takes it; an arc as long as `most` is accepted.
-        face: number of the face that the body lies on at theta = 0, in the order of the search, or None.
+        face: number of the face that the body lies on at theta = 0, from 1 in the order of the search, or None.
         most: theta_max, where something else touches [rad].
         balance: theta at which the CoM is above the contact, or highest [rad].
         radius: of a round end, else 0 [m].
@@ -54,7 +54,8 @@ def contacts(
     if body.dim == 2:
         return [one for one in [_planar(model, body, shown)] if one.most >= least]
     hull, gripped = read_hull(model, body.index), grip(model, body)
-    met = list(faces(hull, promising(hull, "vertex", least) | promising(hull, "edge", least)))
+    up = matrix(body.table)[:, 2] @ initial_data(model).xmat[body.index].reshape(3, 3)
+    met = list(faces(hull, promising(hull, "vertex", least) | promising(hull, "edge", least), up))
     longest: dict[str, float] = {}
     found: list[Candidate] = []
 
@@ -67,10 +68,10 @@ def contacts(
             if len(one.points) == 1 or gripped(one) is not Grip.ALTERNATING:
                 found.append(Candidate(_kind(hull, one), contact, face, most, one.balance, float(one.radius[0])))
 
-    for number, on in enumerate(met):
+    for number, on in enumerate(met, start=1):
         for kind in ("edge", "vertex"):
             listed(on_face(hull, on, kind, least), number)
-    for number, on in enumerate(met):  # about other axes, if about that towards the CoM it is no candidate
+    for number, on in enumerate(met, start=1):  # about other axes, if about that towards the CoM it is no candidate
         new = (held for held in spots(hull, on, least) if written(held.points, shown) not in longest)
         listed(aside(hull, new, on.up, least), number)
     for kind in ("edge", "vertex"):
@@ -86,7 +87,7 @@ def _planar(model: mujoco.MjModel, body: RigidBody, shown: Shown) -> Candidate:
     point, radius, most = planar_stance(model, body.index, "lowest", axes)
     lever = (body.com - point) @ axes
     kind = "round end" if radius > 0.0 else "vertex"
-    return Candidate(kind, written(point, shown), 0, most, float(np.arctan2(lever[0], lever[2])), radius)
+    return Candidate(kind, written(point, shown), 1, most, float(np.arctan2(lever[0], lever[2])), radius)
 
 
 def _kind(hull: Hull, one: Stance) -> str:

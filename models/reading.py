@@ -240,3 +240,17 @@ def _object_axes(o: Array) -> Array:
         if abs(axis @ o) < 1e-6:
             return np.column_stack([axis, o, np.cross(axis, o)])
     raise ModelError("body: none of its axes lies in the plane of its motion, so theta = 0 is not defined")
+
+
+def laid_over(model: mujoco.MjModel, body: RigidBody, orientation: Array) -> float:
+    """[deg] between the table's normal seen from a body as the file has it and as it is at an orientation (4,).
+
+    Up to a tenth of a degree, which a file may have without meaning it, it is 0.
+
+    Args:
+        orientation: object axes to world.
+    """
+    up, turned = matrix(body.table)[:, 2], matrix(orientation) @ matrix(body.axes).T
+    cosine = float((up @ initial_data(model).xmat[body.index].reshape(3, 3)) @ (up @ turned))
+    angle = float(np.rad2deg(np.arccos(np.clip(cosine, -1.0, 1.0))))
+    return angle if angle > 0.1 else 0.0

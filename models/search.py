@@ -24,7 +24,8 @@ def search(
     elif contact == "lowest" and now is not None:
         found = _lowest(body, least, now)
     elif contact in ("vertex", "edge"):
-        found = _tilts(body, contact, least, faces(body, promising(body, contact, least)))
+        up = None if now is None else now[2]
+        found = _tilts(body, contact, least, faces(body, promising(body, contact, least), up))
     else:
         raise ModelError(f"contact = {contact!r}: must be {ALLOWED}")
     return (one for one in found if arc is None or arc.within(one.range[1]))

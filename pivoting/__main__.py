@@ -133,7 +133,7 @@ def _say_that_it_compiles() -> bool:
     if CACHE is None:
         where = "in memory, in every run: no folder for a cache can be written to; NUMBA_CACHE_DIR sets one"
     else:
-        where = f"for this machine, once, for up to a minute; later runs take it from {CACHE}"
+        where = f"what such runs need, once, for up to a minute; later ones take it from {CACHE}"
     print(f"pivoting: compiling {where}", file=sys.stderr, flush=True)
     return True
 

@@ -157,7 +157,7 @@ def _remedies(case: _Case) -> Iterator[Remedy]:
     slid, let_go = case.slid is not None, case.let_go is not None
     if case.diverged is not None or scenario.bandwidth * run.dt > QUICK:
         slower = min(_up(0.5 * QUICK / run.dt), 0.5 * scenario.bandwidth)
-        yield Remedy({"bandwidth": slower}, "a law that the time step can follow")
+        yield Remedy({"bandwidth": slower}, "a slower law")
     softer = Remedy({"timeconst": 3.0 * float(run.model.geom_solref[run.truth.support, 0])}, "a softer contact")
     if case.diverged is not None:
         yield from (Remedy({"dt": run.dt / 4.0}, "a finer time step"), softer)

@@ -168,8 +168,8 @@ def run(
 
 @cli.command()
 @click.option("--model", type=click.Path(path_type=Path), required=True, help="An MJCF file of your own.")
-@click.option("--body", required=True, help="Name of the body in it that is to be pivoted.")
-@click.option("--support", help="Name of the plane or box geom that it stands on; by default what is under it.")
+@click.option("--body", required=True, help="Name of the body in it that is to be pivoted, or '#1' of one without a name.")
+@click.option("--support", help="Name (or #id) of the geom that it stands on; by default what is under it.")
 @click.option("--least", type=click.FloatRange(min=0.1), default=5.0, show_default=True, help="Least range, deg.")
 @json_option("Print them all as one JSON object and nothing else.")
 def contacts(model: Path, body: str, support: str | None, least: float, as_json: JsonOutput | None) -> int:

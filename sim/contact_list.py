@@ -41,7 +41,7 @@ def print_contacts(console: Console, said: dict[str, Any]) -> None:
     console.print(f"{'face':>4}  {'theta, deg':>18}  {'balance':>8}  what", style="bold", highlight=False)
     for row in said["contacts"][:ROWS]:
         low, high = row["range_deg"]
-        face = "-" if row["face"] is None else row["face"] + 1
+        face = "-" if row["face"] is None else row["face"]
         line = f"{face:>4}  {f'{low:g} to {high:g}':>18}  {row['balance_deg']:8.2f}  {row['kind']}"
         console.print(f"{line:<46}  {option(row['contact'])}", soft_wrap=True, highlight=False, markup=False)
     more = len(said["contacts"]) - ROWS

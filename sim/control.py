@@ -31,17 +31,13 @@ class States(NamedTuple):
 
     @classmethod
     def turning(cls, orientation: Array, angular_velocity: Array) -> Self:
-        """Of worlds about whose positions nothing is asked; read-only, as what MuJoCo gives, because the compiled loop
-        is compiled anew for arrays of another kind."""
-        values = (
-            np.zeros((len(orientation), 3)),
-            orientation.copy(),
-            np.zeros((len(orientation), 3)),
-            angular_velocity.copy(),
-        )
-        for array in values:
-            array.flags.writeable = False
-        return cls(*values)
+        """States of which only the rotation matters, read-only as MuJoCo's are: for writable arrays numba would compile
+        the loop again."""
+        still = np.zeros((len(orientation), 3))
+        states = cls(still, orientation.copy(), still, angular_velocity.copy())
+        for values in states:
+            values.flags.writeable = False
+        return states
 
 
 class Answers(NamedTuple):

@@ -40,10 +40,8 @@ from pivoting.sim.stepping import ContactLog, run_steps
 from pivoting.sim.strays import contact_margin, refuse_strays
 
 Array = NDArray[np.float64]
-START_DEPTH = (
-    1e-6  # of the lever from contact to CoM, where no load says how deep: there is contact from the first step
-)
-DEEPEST = 1e-2  # likewise, that an object is put at rest in its support
+START_DEPTH = 1e-6  # of the lever from contact to CoM: how deep it starts if its load does not say
+DEEPEST = 1e-2  # likewise: how deep it may start
 PRESSED, SAMPLES = 1e-3, 17  # levers that it is pressed in, and where along its way, to see what it touches with
 Samples = tuple[Array, Array, Array]  # orientations, angular velocities and accelerations
 MAX_STEPS = 10_000_000  # worlds times steps that are kept in memory, about 0.5 kB each
@@ -194,7 +192,10 @@ def _finely_stepped(world: Scene, case: Scenario, plan: Plan) -> Scene:
     """With a finer time step, where the settings are chosen and an object so large would drift too far as it turns."""
     if not case.chosen or "dt" in case.actual:
         return world
-    limits = case.limits.for_object(plan.load.lever, plan.unit * float(np.linalg.norm(plan.body.gravity)))
+    # what the object may slip, whatever it is judged by
+    limits = replace(case.limits, slip_m=None).for_object(
+        plan.load.lever, plan.unit * float(np.linalg.norm(plan.body.gravity))
+    )
     assert limits.slip_m is not None, "limits are for a lever"
     given = float(world.spec.option.timestep)
     dt = fine_step(given, plan.unit * plan.arm, *case.pace, limits.slip_m)
@@ -284,7 +285,7 @@ def believe(
         read_friction(read.read, body_id(read.read, read.body), geom_id(read.read, read.support), plan.contacts)
     if controller is not None:
         _check(controller, case, plan)
-    floor = case.f_min or 0.0 if controller is None else controller.belief.f_min.max()
+    floor = (case.f_min or 0.0) if controller is None else controller.belief.f_min.max()
     if plan.load.force == 0.0 and floor == 0.0:
         raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the object on its support")
     if controller is not None:

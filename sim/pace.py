@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 NOT_HELD, DRIFT = 1.0 / 21.0, 1.0 / 40.0
-SPARE = 3.0  # times what would just do; far from the CoM of a light body it is up to 2.8, see contact_settings.py
+SPARE = 3.0  # times the least force; a light body's softer contact (see contact_settings.py) needs up to 2.8 times
 SHARE = 0.5  # of the limit on the slip that may go into the drift
 
 
 def closing_force(mass: float, arm: float, rate: Array) -> float:
-    """[N] with which a contact is to be pressed to stay closed while an object [kg] turns at rates (N,) [rad/s].
+    """The normal force [N] that keeps a contact closed while an object of `mass` [kg] turns at `rate` (N,) [rad/s].
 
     Args:
         arm: [m] to the contact from the point whose velocity is stepped.
     """
-    return SPARE * NOT_HELD * mass * arm * float(np.square(rate[np.isfinite(rate)]).max(initial=0.0))
+    return SPARE * NOT_HELD * mass * arm * float(np.square(rate).max(initial=0.0))
 
 
 def fine_step(dt: float, arm: float, times: Array, rate: Array, slip: float) -> float:
@@ -30,7 +30,7 @@ def fine_step(dt: float, arm: float, times: Array, rate: Array, slip: float) -> 
     Args:
         arm: as above [m].
         times: (N,) [s] at which it turns at rates (N,) [rad/s].
-        slip: the limit [m].
+        slip: the limit [m], > 0.
     """
-    drift = DRIFT * dt * arm * float(np.trapezoid(np.nan_to_num(rate) ** 2, times))
+    drift = DRIFT * dt * arm * float(np.trapezoid(rate**2, times))
     return float(dt / max(1.0, np.ceil(drift / (SHARE * slip))))

@@ -18,8 +18,21 @@ from rich.table import Table
 
 _EVENTS, _FAILED = 5, 10  # events and failed worlds that people are shown
 _READ = {"object": "read of the object", "contact_settings": "contact"}  # what was read, in the summary and in words
-_SAID = {"replaced": "in place of the file's", "contacts": "", "coupling": ""}  # of it otherwise, or not at all
-_UNITS = {"kg_m2": "kg m^2", "kg": "kg", "m": "m", "s": "s"}  # with which a name in the summary may end
+_SAID = {  # of it otherwise, or not at all
+    "replaced": "in place of the file's",
+    "contacts": "",
+    "coupling": "",
+    "f_min_N": "pressed with",
+    "laid_over_deg": "laid on another side than in the file, over by",
+}
+_UNITS = {
+    "kg_m2": "kg m^2",
+    "kg": "kg",
+    "m": "m",
+    "s": "s",
+    "N": "N",
+    "deg": "deg",
+}  # with which a name in the summary may end
 
 # name in the summary: (what people read, factor, unit)
 _LINES = {
@@ -144,9 +157,11 @@ def _shown(value: Any) -> str:
     if not isinstance(value, list | tuple):
         return _plain(value)
     table = np.array(value, dtype=float) if not any(isinstance(item, str) for item in value) else np.empty(0)
+    table = np.where(np.abs(table) < 1e-7 * np.abs(table).max(initial=0.0), 0.0, table)  # rounding
     if table.ndim == 2 and table.shape == (3, 3) and not (table - np.diag(np.diag(table))).any():
         return f"diag{_shown(np.diag(table).tolist())}"
-    return "(" + ", ".join(_shown(item) for item in value) + ")"
+    items = value if table.ndim != 1 or not table.size else table.tolist()
+    return "(" + ", ".join(_shown(item) for item in items) + ")"
 
 
 def _plain(value: Any) -> str:

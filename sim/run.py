@@ -15,7 +15,7 @@ from pivoting.models.contact_rows import ContactRows
 from pivoting.models.contact_settings import ContactSettings
 from pivoting.models.frames import matrix
 from pivoting.models.naming import geom_name
-from pivoting.models.reading import RigidBody, file_frame
+from pivoting.models.reading import RigidBody, file_frame, laid_over
 from pivoting.sim.advice import reasons, remedies
 from pivoting.sim.attach import Attached
 from pivoting.sim.contact_readings import ContactReadings, Declared
@@ -359,6 +359,7 @@ class Run:
             "radius_m": (self.unit * self.radius).tolist(),
             "damping": 0.0 if self.truth.drag is None else float(self.truth.drag.damping.max()),
             "frictionloss": 0.0 if self.truth.drag is None else float(self.truth.drag.friction.max()),
+            "laid_over_deg": laid_over(self.model, self.truth, self.turn[1]),
         }
 
     @property

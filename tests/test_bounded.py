@@ -182,8 +182,8 @@ def test_a_bound_is_a_heavier_weight(controller: WrenchController, kind: str) ->
     def step(bounds: WrenchBounds, angle: float, wanted: float) -> tuple[np.ndarray, ...]:
         out = np.empty((1, nw)), np.empty((1, nw)), np.empty((1, n)), np.empty(1), np.empty(1, np.int8)
         q, q_d = tilted(angle)[None], tilted(wanted)[None]
-        held = tuple(bounds.stacked(nw))
-        step_worlds(belief, held, *work, 1e-9, q, still, q_d, still, still, np.zeros((1, nw)), *out)
+        own, none = tuple(bounds.stacked(nw)), np.zeros((1, nw))
+        step_worlds(belief, own, *work, 1e-9, q, still, q_d, still, still, none, *out)
         assert out[4][0] == 0
         return tuple(values[0] for values in out[:3])
 

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
+SHORT = "run", "balance-2d", "--set", "seconds=1", "--json"
 MEMORY = (
     "pivoting: compiling in memory, in every run: no folder for a cache can be written to; NUMBA_CACHE_DIR sets one"
 )
@@ -111,8 +112,8 @@ def test_where_nothing_can_be_written_it_compiles_in_memory_and_says_so(
     told = run(read_only, "--version", cwd=tmp_path)
     assert told.returncode == 0, told.stderr
     assert told.stdout.startswith("pivoting 0.")
-    assert told.stderr.splitlines() == [MEMORY]
-    done = run(read_only, "run", "balance-2d", "--set", "seconds=1", "--out", "out", "--json", cwd=tmp_path)
+    assert told.stderr == ""
+    done = run(read_only, *SHORT, "--out", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["verdict"] == "pass"
     memory, *wrote = done.stderr.splitlines()
@@ -123,10 +124,10 @@ def test_where_nothing_can_be_written_it_compiles_in_memory_and_says_so(
 
 def test_the_variable_that_is_named_sets_a_place(read_only: dict[str, str], tmp_path: Path) -> None:
     place = tmp_path / "place"
-    first = run({**read_only, "NUMBA_CACHE_DIR": str(place)}, "list", cwd=tmp_path)
-    again = run({**read_only, "NUMBA_CACHE_DIR": str(place)}, "list", cwd=tmp_path)
-    assert "pivot-2d" in first.stdout
-    assert first.stderr.startswith("pivoting: compiling for this machine, once")
+    first = run({**read_only, "NUMBA_CACHE_DIR": str(place)}, *SHORT, cwd=tmp_path)
+    again = run({**read_only, "NUMBA_CACHE_DIR": str(place)}, *SHORT, cwd=tmp_path)
+    assert json.loads(first.stdout)["verdict"] == "pass"
+    assert first.stderr.startswith("pivoting: compiling what such runs need, once")
     assert f"{place}/" in first.stderr
     assert again.stderr == ""
 
@@ -135,11 +136,11 @@ def test_a_home_alone_will_do(read_only: dict[str, str], tmp_path: Path) -> None
     """And kernels that are kept there are dropped when the sources change, as everywhere."""
     home = tmp_path / "other"
     home.mkdir()
-    for expected in ("pivoting: compiling for this machine, once", ""):
-        done = run({**read_only, "HOME": str(home)}, "list", cwd=tmp_path)
+    for expected in ("pivoting: compiling what such runs need, once", ""):
+        done = run({**read_only, "HOME": str(home)}, *SHORT, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         assert done.stderr.startswith(expected)
         assert str(home) in done.stderr or not expected
     (kept,) = home.rglob("kernels.sha256")
     kept.write_text("other sources")
-    assert run({**read_only, "HOME": str(home)}, "list", cwd=tmp_path).stderr.startswith("pivoting: compiling for")
+    assert run({**read_only, "HOME": str(home)}, *SHORT, cwd=tmp_path).stderr.startswith("pivoting: compiling what")
