@@ -22,6 +22,7 @@ from pivoting.models.tilt import Arc, Stance, interval
 
 TRIES = 400  # contacts among which a nearest one is looked for, or one beside which no other corner touches
 Gripped = Callable[[Stance], Grip]  # how the simulator holds it
+Misfit = Callable[[Stance], str]  # why it cannot be had where the body stands, or nothing
 
 
 def contact_points(model: mujoco.MjModel, body_index: int) -> Array:
@@ -55,6 +56,7 @@ def stance(
     *,
     arc: Arc | None = None,
     gripped: Gripped | None = None,
+    misfit: Misfit = lambda one: "",
     shown: Shown = as_compiled,
 ) -> Stance:
     """How to pivot a body about a contact.
@@ -79,6 +81,7 @@ def stance(
         arc: the angles that it has to allow; by default any range will do.
         gripped: how the simulator holds a contact, see `models.grip`, which prefers what is held firmly, and refuses
             edges that are not; by default everything is.
+        misfit: why a contact cannot be had where the body stands, which is then passed over; by default all can.
         shown: points as the reader of a message has them, by default in the compiled body frame.
 
     Raises:
@@ -88,9 +91,9 @@ def stance(
     if xquat is not None or (isinstance(contact, str) and contact == "lowest"):
         now = matrix(np.asarray(table)).T @ matrix(np.asarray(model.body_quat[body_index] if xquat is None else xquat))
     one = alternating = None
-    reason = ""
+    reason = told = ""
     try:
-        one, alternating = _chosen(search(body, contact, arc, now, shown), gripped)
+        one, alternating, told = _chosen(search(body, contact, arc, now, shown), gripped, misfit)
     except ModelError as error:
         if not isinstance(contact, str) or contact != "lowest":
             raise
@@ -103,13 +106,15 @@ def stance(
             contact, str
         ):  # of its faces, that from which it can be turned farthest
             first = max(search(body, contact, None, now, shown), key=lambda one: one.range[1])
-        if alternating is not None:
+        if told:
+            reason = told
+        elif alternating is not None:
             reason = not_held(body, contact, alternating, shown)
         elif first is not None and arc is not None:
             reason = out_of_range(body, contact, first.held, first.up, first.range[1], arc, shown)
         else:
             reason = no_contact(body, contact, shown)
-    raise ModelError(reason + _way_out(body, contact, arc, now, gripped, shown))
+    raise ModelError(reason + _way_out(body, contact, arc, now, gripped, misfit, shown))
 
 
 def planar_stance(
@@ -154,16 +159,24 @@ def planar_stance(
     return point, radius, high
 
 
-def _chosen(found: Iterable[Stance], gripped: Gripped | None) -> tuple[Stance | None, Stance | None]:
-    """The stance that is held best, the first of equals; and the first that alternates."""
+def _chosen(
+    found: Iterable[Stance], gripped: Gripped | None, misfit: Misfit
+) -> tuple[Stance | None, Stance | None, str]:
+    """The stance that is held best, the first of equals; the first that alternates; why the first does not fit."""
     first: dict[Grip, Stance] = {}
+    told = ""
     for tried, one in enumerate(found):
+        if wrong := misfit(one):
+            told = told or wrong
+            if tried >= TRIES:
+                break
+            continue
         how = Grip.FIRM if gripped is None else gripped(one)
         first.setdefault(how, one)
         if how is Grip.FIRM or (tried >= TRIES and first.keys() - {Grip.ALTERNATING}):
             break
     alternating = first.pop(Grip.ALTERNATING, None)
-    return next((first[how] for how in Grip if how in first), None), alternating
+    return next((first[how] for how in Grip if how in first), None), alternating, told
 
 
 def _down(body: Hull, one: Stance) -> Array:
@@ -177,7 +190,13 @@ def _down(body: Hull, one: Stance) -> Array:
 
 
 def _way_out(
-    body: Hull, contact: str | ArrayLike, arc: Arc | None, now: Array | None, gripped: Gripped | None, shown: Shown
+    body: Hull,
+    contact: str | ArrayLike,
+    arc: Arc | None,
+    now: Array | None,
+    gripped: Gripped | None,
+    misfit: Misfit,
+    shown: Shown,
 ) -> str:
     """The nearest contact that would do, or else the one with the widest range, as the end of a message."""
     asked = arc or Arc(0.0, 0.0)
@@ -186,13 +205,13 @@ def _way_out(
     if not isinstance(contact, str):
         at = np.atleast_2d(np.asarray(contact, dtype=float)).mean(axis=0)
         some = sorted(islice(some, TRIES), key=lambda one: float(np.linalg.norm(one.points.mean(axis=0) - at)))
-    one = _chosen(some, gripped)[0]
+    one = _chosen(some, gripped, misfit)[0]
     if one is not None:
         value = (
             written(one.points, shown) if not isinstance(contact, str) else "vertex" if len(one.points) == 1 else "edge"
         )
         return f"; nearest: {option(value)}, within {within(asked, one.range[1])}"
-    one = _chosen(sorted(widest(body), key=lambda one: -one.range[1]), gripped)[0]
+    one = _chosen(sorted(widest(body), key=lambda one: -one.range[1]), gripped, misfit)[0]
     if one is not None:
         value = option(written(one.points, shown))
         return f"; nothing of it allows that; widest: {value}, within {within(asked, one.range[1])}"

@@ -18,6 +18,8 @@ class JointDrag(NamedTuple):
     Attributes:
         damping: (n,) [N s/m] of translations, [N m s/rad] of rotations.
         friction: (n,) greatest dry friction [N, N m].
+        rate, give: (n,) b [1/s] and R [1/kg, 1/(kg m^2)] of its rows: at a velocity v and an acceleration a it is
+            -(b v + a) / R, up to the greatest.
         anchor: (3,) the point of the body whose velocity the translations are, body frame [m].
         slides: (2, 3) axes of the two slides of a planar body, world axes; (0, 3) for a free joint.
         ahead: of the time to which the velocity belongs that MuJoCo damps: a time step where it integrates damping
@@ -26,6 +28,8 @@ class JointDrag(NamedTuple):
 
     damping: Array
     friction: Array
+    rate: Array
+    give: Array
     anchor: Array
     slides: Array
     ahead: float
@@ -169,9 +173,19 @@ def read_drag(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> JointDra
     if not (damping.any() or friction.any()):
         return None
     joint, kinds = int(model.body_jntadr[body]), mujoco.mjtIntegrator
+    rows = slice(dof, dof + count)
+    rate, give = _friction_rows(model, rows)
     explicit = {int(kinds.mjINT_RK4): True, int(kinds.mjINT_EULER): _off(model, "EULERDAMP")}
     ahead = 0.0 if explicit.get(int(model.opt.integrator), False) else float(model.opt.timestep)
     if count == 6:
-        return JointDrag(damping, friction, np.zeros(3), np.zeros((0, 3)), ahead)
+        return JointDrag(damping, friction, rate, give, np.zeros(3), np.zeros((0, 3)), ahead)
     slides = np.array(data.xaxis[joint : joint + 2])
-    return JointDrag(damping, friction, np.array(model.jnt_pos[joint + 2]), slides, ahead)
+    return JointDrag(damping, friction, rate, give, np.array(model.jnt_pos[joint + 2]), slides, ahead)
+
+
+def _friction_rows(model: mujoco.MjModel, dofs: slice) -> tuple[Array, Array]:
+    """b [1/s] and R of MuJoCo's rows of dry friction, which are at no distance: without stiffness, impedance dmin."""
+    (timeconst, dampratio), (dmin, dmax) = model.dof_solref[dofs].T, model.dof_solimp[dofs, :2].T
+    safe = timeconst if _off(model, "REFSAFE") else np.maximum(timeconst, 2.0 * model.opt.timestep)
+    rate = np.where(timeconst > 0.0, 2.0 / (dmax * np.where(timeconst > 0.0, safe, 1.0)), -dampratio / dmax)
+    return rate, (1.0 - dmin) / dmin * np.array(model.dof_invweight0[dofs])

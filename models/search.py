@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pivoting.models.faces import SLACK, Face, face, faces, middle, promising
+from pivoting.models.faces import SAME, SLACK, Face, face, faces, middle, promising
 from pivoting.models.frames import Array
 from pivoting.models.given import ALLOWED, Shown, as_compiled, held_by_hand
 from pivoting.models.hull import Hull, Indices
@@ -25,24 +25,25 @@ def search(
         found = _lowest(body, least, now)
     elif contact in ("vertex", "edge"):
         up = None if now is None else now[2]
-        found = _tilts(body, contact, least, faces(body, promising(body, contact, least), up))
+        found = _tilts(body, contact, least, faces(body, promising(body, contact, least), up), now)
     else:
         raise ModelError(f"contact = {contact!r}: must be {ALLOWED}")
     return (one for one in found if arc is None or arc.within(one.range[1]))
 
 
-def _tilts(body: Hull, kind: str, least: float, found: Iterable[Face]) -> Iterator[Stance]:
+def _tilts(body: Hull, kind: str, least: float, found: Iterable[Face], now: Array | None) -> Iterator[Stance]:
     """About the edges, or vertices, of the hull: face by face, then vertices about other axes, then what is of no face.
 
     Of those with a range of less than `least` [rad] some are left out.
     """
-    met = []
+    met: list[tuple[Face, Array | None]] = []
     for one in found:
-        met.append(one)
-        yield from on_face(body, one, kind, least)
+        stands = now is not None and one.up @ now[2] > 1.0 - SAME  # as it does now: its yaw is kept
+        met.append((one, now if stands else None))
+        yield from on_face(body, one, kind, least, met[-1][1])
     if kind == "vertex":
-        for one in met:
-            yield from aside(body, spots(body, one, least), one.up, least)
+        for one, kept in met:
+            yield from aside(body, spots(body, one, least), one.up, least, kept)
     for held, up in of_no_face(body, kind, least):
         yield from about(body, held, up, least)
 

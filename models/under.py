@@ -22,8 +22,9 @@ def first_met(
 ) -> int | None:
     """Id of that of the geoms `others` on which a body with the geoms `own` would fall; None if there is none.
 
-    Where it would meet several at once, that which is closest to being under its CoM. One that is a little inside the
-    body counts. Columns are those of the body's corners, of a grid, and of the others' corners.
+    Where it would meet several at once, that which is closest to being under its CoM. One that is inside the body up to
+    half of its height there counts; what touches it from above does not. Columns are those of the body's corners, of a
+    grid, and of the others' corners.
 
     Args:
         data: with the kinematics computed.  up: (3,) against gravity, world axes.
@@ -43,13 +44,14 @@ def first_met(
         columns += [(foot, np.nan) for foot in np.stack(sides, axis=-1).reshape(-1, 2)]
         for foot, height in _some(columns):
             under, over = span(foot @ across, height)
-            far, geom = ground.cast(foot @ across + over * up, -up)
-            if geom >= 0 and np.isfinite(under):
-                yield under - over + far, float(np.linalg.norm(foot - middle)), geom
+            begin = 0.5 * (under + over)
+            far, geom = ground.cast(foot @ across + begin * up, -up) if np.isfinite(under) else (0.0, -1)
+            if geom >= 0:
+                yield under - begin + far, float(np.linalg.norm(foot - middle)), geom
         feet = corners[1] @ across.T
         for i in _some(np.flatnonzero(((feet >= low) & (feet <= high)).all(axis=1)).tolist()):
             under, over = span(feet[i] @ across, np.nan)
-            if np.isfinite(under) and corners[1][i] @ up <= over:
+            if np.isfinite(under) and corners[1][i] @ up <= 0.5 * (under + over):
                 away = float(np.linalg.norm(feet[i] - middle))
                 yield under - float(corners[1][i] @ up), away, int(corners[0][i])
 

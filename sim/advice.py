@@ -125,8 +125,8 @@ def _reasons(case: _Case) -> Iterator[str]:
         if np.isfinite(floor):
             part = f"{100.0 * min(floor / slip, 1.0):.0f} % of it the simulator's own"
         yield f"the contact crept by {1e3 * slip:.3g} mm without sliding, {part}"
-        if run.scenario.name == "pivot" and not run.scenario.chosen:
-            yield "its contact and solver parameters are the file's: without --as-modelled they are chosen"
+    if run.scenario.name == "pivot" and not run.scenario.chosen:
+        yield "its contact and solver parameters are the file's: without --as-modelled they are chosen"
     if case.failed("angle_error_rms_deg") or case.failed("angle_error_max_deg"):
         yield f"the angle was off by up to {float(run.measures.angle_error_max_deg[i]):.3g} deg"
     if case.failed("force_mismatch_rel"):

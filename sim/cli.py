@@ -131,7 +131,10 @@ def run(
     from pivoting.sim.loop import simulate
     from pivoting.sim.shipped import scenario as find
 
-    changes: dict[str, Any] = {**_pairs("--set", settings), "limits": _pairs("--limit", limits)}
+    changes: dict[str, Any] = _pairs("--set", settings)
+    if "limits" in changes:
+        raise click.BadParameter("--set limits: must be --limit KEY=VALUE")
+    changes["limits"] = _pairs("--limit", limits)
     case = (_own(**own) if scenario == "pivot" else find(scenario)).change(**changes)
     given = [key for key, value in own.items() if value is not None and value is not False]
     if scenario != "pivot" and given:
@@ -168,7 +171,7 @@ def run(
 
 @cli.command()
 @click.option("--model", type=click.Path(path_type=Path), required=True, help="An MJCF file of your own.")
-@click.option("--body", required=True, help="Name of the body in it that is to be pivoted, or '#1' of one without a name.")
+@click.option("--body", required=True, help="Name of the body in it, or '#1' of one without a name.")
 @click.option("--support", help="Name (or #id) of the geom that it stands on; by default what is under it.")
 @click.option("--least", type=click.FloatRange(min=0.1), default=5.0, show_default=True, help="Least range, deg.")
 @json_option("Print them all as one JSON object and nothing else.")

@@ -9,7 +9,6 @@ from pivoting.models.frames import matrix
 from pivoting.models.reading import RigidBody
 
 Array = NDArray[np.float64]
-STILL = 1e-9  # of the lever or a radian, in a second: a joint that moves more slowly is at rest
 
 
 def drag_wrench(
@@ -19,8 +18,8 @@ def drag_wrench(
 
     A free joint's dampers act on the velocity of the body's origin along the world's axes, and on its angular velocity
     along its own; a planar body's on the velocities of its slides, which are those of its hinge along their axes, and
-    on that of the hinge. The object turns about what touches. Dry friction at rest may be anything up to its limit, and
-    is left out. Where MuJoCo integrates damping implicitly, it acts on the velocity that the step leads to.
+    on that of the hinge. The object turns about what touches. Dry friction is as soft as MuJoCo makes it, see
+    `JointDrag`. Where MuJoCo integrates damping implicitly, it acts on the velocity that the step leads to.
 
     Args:
         orientation: (N, 4).  omega, alpha: (N, 3) angular velocities and accelerations, world axes.
@@ -33,21 +32,20 @@ def drag_wrench(
     anchor = axes.T @ (drag.anchor - body.com)  # object axes
     turned = rotated(q, anchor - belief.pivot)
     ahead = np.cross(bend, turned - belief.offset) + np.cross(w, np.cross(w, turned))  # of what rolls, too
-    velocity = np.cross(w, turned - belief.offset) + drag.ahead * ahead
-    w = w + drag.ahead * bend
-    size = float(np.linalg.norm(anchor - belief.pivot) + np.linalg.norm(belief.offset))
+    velocity = np.cross(w, turned - belief.offset)
 
-    def resist(speed: Array, dofs: slice, still: float) -> Array:
-        moving = np.where(np.abs(speed) > still, np.sign(speed), 0.0)
-        return -drag.damping[dofs] * speed - drag.friction[dofs] * moving
+    def resist(speed: Array, change: Array, dofs: slice) -> Array:
+        dry = (drag.rate[dofs] * speed + change) / drag.give[dofs]
+        damped = drag.damping[dofs] * (speed + drag.ahead * change)
+        return -damped - np.clip(dry, -drag.friction[dofs], drag.friction[dofs])
 
     if len(drag.slides):
-        force = resist(velocity @ drag.slides.T, slice(0, 2), STILL * size) @ drag.slides
+        force = resist(velocity @ drag.slides.T, ahead @ drag.slides.T, slice(0, 2)) @ drag.slides
         normal = np.cross(*drag.slides)
-        turning = resist((w @ normal)[:, None], slice(2, 3), STILL) * normal
+        turning = resist((w @ normal)[:, None], (bend @ normal)[:, None], slice(2, 3)) * normal
         moment = rotated(q * CONJUGATE, turning)
     else:
-        force = resist(velocity, slice(0, 3), STILL * size)
-        moment = resist(rotated(q * CONJUGATE, w), slice(3, 6), STILL)
+        force = resist(velocity, ahead, slice(0, 3))
+        moment = resist(rotated(q * CONJUGATE, w), rotated(q * CONJUGATE, bend), slice(3, 6))
     local = rotated(q * CONJUGATE, force)
     return np.concatenate([local, moment + np.cross(anchor, local)], axis=1) @ belief.wrench_map.T

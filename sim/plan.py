@@ -1,6 +1,7 @@
 """Where a scenario's object stands and about what it turns: contacts, axis, and the orientation at angle 0."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -13,14 +14,16 @@ from pivoting.models.given import NEAR
 from pivoting.models.grip import grip
 from pivoting.models.hull import body_size
 from pivoting.models.naming import ModelError, label
-from pivoting.models.reading import RigidBody, file_frame, initial_data, read_body
-from pivoting.models.tilt import Arc
+from pivoting.models.reading import RigidBody, file_frame, initial_data, place, read_body
+from pivoting.models.tilt import Arc, Stance
 from pivoting.sim.fidelity import stepped_point
 from pivoting.sim.keys import LOWEST
 from pivoting.sim.relative import Load, load
 from pivoting.sim.scenario import PACE, Scenario
+from pivoting.sim.strays import refuse_strays
 
 Array = NDArray[np.float64]
+WAY = 9  # angles of an arc at which the object may touch nothing else
 ANY = Load(1e-6, 1.0, 1e-6)  # so small that nothing that is relative to it is too large
 
 
@@ -68,7 +71,7 @@ def planned(case: Scenario, model: mujoco.MjModel, unit: float = 1.0) -> Plan:
     body = read_body(model, case.body, case.support)
     size = body_size(model, body.index)
     _refuse_beside(model, body, initial_data(model).xipos[body.index], size, "its centre of mass", unit)
-    found = _planar(case, model, body) if body.dim == 2 else _spatial(case, model, body)
+    found = _planar(case, model, body) if body.dim == 2 else _spatial(case, model, body, unit)
     held = (found.contacts - found.contacts[0]) @ (matrix(found.start) @ matrix(body.axes).T).T
     _refuse_beside(model, body, found.at + held, NEAR * size, "the contact", unit)
     away = np.linalg.norm(found.contacts - stepped_point(model, body.index), axis=1) + found.radius
@@ -104,7 +107,7 @@ def transplanted(plan: Plan, model: mujoco.MjModel, body: RigidBody, grown: floa
     )
 
 
-def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
+def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody, unit: float) -> Plan:
     """In space the contacts are found on the object, as `models.candidates.stance` does."""
     table, gap = matrix(body.table), np.deg2rad(LOWEST)
     data = initial_data(model)
@@ -120,6 +123,7 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
         body.table,
         arc=arc,
         gripped=None if case.about == "yaw" else grip(model, body, arc),
+        misfit=(lambda one: "") if arc is None else partial(_misfit, model, initial_data(model), body, unit, arc),
         shown=lambda points: (points - origin) @ axes,
     )
     start, axis = table @ found.rotation, table @ found.axis
@@ -131,6 +135,23 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
         limits = (-2.0 * np.pi, 2.0 * np.pi)
     at = _below(model, body, found.points[0])  # the object starts where its file has it
     return Plan(body, found.points, found.radius, at, axis, quaternion(start), limits, found.face)
+
+
+def _misfit(model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody, unit: float, arc: Arc, one: Stance) -> str:
+    """Why a contact cannot be had where the object stands, on the way of an arc about it, or nothing."""
+    table, at = matrix(body.table), _below(model, body, one.points[0])
+    held = (one.points - one.points[0]) @ (table @ one.rotation @ matrix(body.axes).T).T
+    start = quaternion(table @ one.rotation)
+    try:
+        _refuse_beside(model, body, at + held, NEAR * body_size(model, body.index), "the contact", unit)
+        for theta in np.linspace(arc.theta, arc.theta_end, WAY):
+            turned = quaternion_product(exponential(theta * (table @ one.axis)), start)
+            place(model, data, body, turned, one.points[0], at + one.radius[0] * table[:, 2])
+            mujoco.mj_fwdPosition(model, data)
+            refuse_strays(model, data, body, unit, f"at {np.rad2deg(theta):.3g} deg")
+    except ModelError as error:
+        return str(error)
+    return ""
 
 
 def _arc(case: Scenario) -> Arc | None:

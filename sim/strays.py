@@ -7,6 +7,7 @@ import numpy as np
 from pivoting.models.body_contacts import forced
 from pivoting.models.naming import ModelError, label
 from pivoting.models.reading import RigidBody, initial_data
+from pivoting.sim.engine_log import engine_log
 
 if TYPE_CHECKING:
     from pivoting.sim.run import Run
@@ -18,7 +19,9 @@ def contact_margin(model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody) 
     return max((float(one.contact.includemargin) for one in held), default=0.0)
 
 
-def refuse_strays(model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody, unit: float = 1.0) -> None:
+def refuse_strays(
+    model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody, unit: float = 1.0, when: str = "where it starts"
+) -> None:
     """The object may touch nothing but its support at the start, in a model whose lengths are in `unit` [m].
 
     Raises:
@@ -27,11 +30,12 @@ def refuse_strays(model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody, u
     for own, other, contact in forced(model, data, body.index):
         if other != body.support:
             deep = f"by {-1e3 * unit * float(contact.dist):.3g} mm" if contact.dist < 0.0 else "within its margin"
-            told = f"where it starts, its geom {label(model, own)} is in {label(model, other)} {deep}"
+            told = f"{when}, its geom {label(model, own)} is in {label(model, other)} {deep}"
             support = label(model, body.support)
             raise ModelError(f"body = {body.name!r}: {told}; must touch nothing but its support {support}")
 
 
+@engine_log()
 def stray_words(run: "Run") -> list[str]:
     """Which geoms met in contacts that are not declared, in the worst world, and when first; by replaying it.
 

@@ -16,7 +16,7 @@ HEAVY = '<inertial pos="0 0 0" mass=".025" diaginertia="1 1 1"/>'
 
 
 def slid(folder: Path) -> Scenario:
-    return own(folder, mjcf()).change(world={"mu": 0.2}, mu=1.0)
+    return own(folder, mjcf()).change(world={"mu": 0.05}, mu=1.0)
 
 
 def short(folder: Path) -> Scenario:
@@ -43,14 +43,15 @@ def rang(folder: Path) -> Scenario:
 
 
 def obstacle(folder: Path) -> Scenario:
-    return own(folder, mjcf(world='<geom name="wall" type="box" size=".01 .5 .5" pos="-.08 0 .5"/>'))
+    ball = '<geom name="ball" type="sphere" size=".02"/>'
+    return own(folder, mjcf(world=f'<body pos="0 0 .25"><freejoint/>{ball}</body>'))
 
 
 CASES: list[Callable[[Path], Scenario]] = [slid, short, absurd, crept, diverged, rang, obstacle]
 SAID = {
     "slid": "the contact slid at ", "short": "the contact let go at ", "absurd": "the contact let go at ",
     "crept": "the contact ", "diverged": "the object diverged at ", "rang": "the object diverged at ",
-    "obstacle": "geom 'g' touches 'wall' at ",
+    "obstacle": "geom 'g' touches 'ball' at ",
 }  # fmt: skip
 
 
@@ -108,7 +109,7 @@ def test_what_it_says_is_so(name: str, failing: dict[str, Run]) -> None:
             assert said[0] == pytest.approx(100.0 * run.measures.force_mismatch_rel[0], rel=0.01)
 
 
-@pytest.mark.parametrize("name", SAID)
+@pytest.mark.parametrize("name", sorted(SAID.keys() - {"obstacle"}))  # nothing holds what something falls on
 def test_what_is_said_to_hold_it_does(name: str, failing: dict[str, Run]) -> None:
     """The first that was tried and passed, given again as text, as the command line does."""
     run = failing[name]

@@ -109,6 +109,7 @@ def test_a_diverged_run_is_still_json() -> None:
         (["run", "pivot-2d", "--set", "world.law=static"], "world.law"),
         (["run", "pivot-2d", "--set", "mu=.2", "--set", "mu=.3"], "--set 'mu=.3': mu is already given as .2"),
         (["run", "pivot-2d", "--set", "force_max=0.8x"], "force_max = '0.8x': must be a number, or in weights"),
+        (["run", "pivot-2d", "--set", "limits=5"], "--set limits: must be --limit KEY=VALUE"),
         (["run", "pivot-2d", "--limit", "slip=1"], "limits.slip = '1': must be a known limit: slip_m"),
         (["run", "pivot-2d", "--limit", "slip_m=x"], "limits.slip_m = 'x': must be a number"),
         (["run", "pivot-2d", "--limit", "slip_m=1", "--limit", "slip_m=2"], "slip_m is already given as 1"),

@@ -24,6 +24,7 @@ from tests.draws import (
     stack,
     stated,
     trivial_cost,
+    wedge,
     whitened_objective,
 )
 
@@ -176,6 +177,17 @@ def test_one_contact_in_closed_form_and_by_the_interior_point(monkeypatch: pytes
         assert interior_point.contact_wrench.py_func(*data, iterated, w, scratch) <= 1e-12
         closed = solve(stated(data)).force[0]
         np.testing.assert_allclose(iterated, closed, rtol=0.0, atol=1e-9 * (np.abs(closed).max() + data.f_min[0]))
+
+
+def test_what_rounding_made_indefinite_is_left_to_the_interior_point() -> None:
+    """The closed form takes roots of H, which here is J'Q_w J of rank 2 and next to nothing."""
+    rng = np.random.default_rng(2)
+    R, p = rotation(rng), rng.normal(size=3)
+    J = np.vstack([R, wedge(p) @ R])
+    Q_w = np.diag([1e-18] * 3 + [1.0] * 3)
+    for _ in range(20):
+        problem = WrenchProblem(J, rng.normal(size=6), [0.5], f_min=[0.0], Q_w=Q_w, Q_f=1e-17 * np.eye(3))
+        assert solve(problem).residual < 1e-12
 
 
 def test_the_closed_form_needs_no_second_try() -> None:

@@ -9,6 +9,8 @@ from mujoco.batch import Batch
 from pivoting.sim import simulate
 from pivoting.sim.engine_log import engine_log
 
+from tests.own_files import mjcf, own
+
 BALL = mujoco.MjModel.from_xml_string(
     '<mujoco><option><flag autoreset="disable"/></option><worldbody><body><freejoint/><geom size=".1"/></body>'
     "</worldbody></mujoco>"
@@ -29,6 +31,17 @@ def test_a_world_that_diverges(
         re.match(r"Nan, Inf or huge value in Q.* unstable\. t = 0\.0\d+ s", told) for told in run.engine_warnings
     )
     assert simulate("balance-2d", seconds=0.6).engine_warnings == ()
+
+
+def test_a_run_that_is_replayed_leaves_nothing_either(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To name what it touched."""
+    coarse = mjcf().replace('timestep="0.001"', 'timestep="0.05"')
+    run = simulate(own(tmp_path, coarse, chosen=False))
+    (empty := tmp_path / "empty").mkdir()
+    monkeypatch.chdir(empty)
+    assert run.verdict == "fail"
+    assert run.strays
+    assert list(empty.iterdir()) == []
 
 
 def test_each_is_told_once_at_its_first_time_from_any_thread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -137,7 +137,7 @@ def test_known_as_modelled(tmp_path: Path, case: dict[str, Any], contact: str) -
         ({"geom": 'condim="6"'}, "condim 6"),
         ({"option": '><flag diagexact="enable"/></option><option '}, "diagexact"),
         ({"body": BOX + '<geom type="box" size=".05 .04 .06" mass="1" solref=".01 1"/>'}, "differ"),
-        ({"option": ELLIPTIC, "world": {"mu": 0.2}}, "a contact slides"),
+        ({"option": ELLIPTIC, "world": {"mu": 0.16}}, "a contact slides"),
         ({"option": ELLIPTIC, "geom": 'solref=".004 1"', "theta_end": 60.0, "seconds": 0.4}, "no contact holds it"),
     ],
 )
