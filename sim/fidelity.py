@@ -74,7 +74,7 @@ def held(rows: ContactRows, listed: Listed, at: Array, axes: Array) -> Held:
     else:
         lean, slides = np.ones_like(use), (use**2).sum(axis=-1) >= SLIDES * push**2
     local = rows.softness(listed.depth + rows.margin)[..., None] * lean * rows.D[1:] * pull
-    give = (local[..., :1] * listed.tangent + local[..., 1:] * np.cross(listed.normal, listed.tangent)) @ axes[:, :2]
+    give = (local[..., :1] * listed.tangent + local[..., 1:] * listed.other) @ axes[:, :2]
     above = (listed.position - listed.share @ at) @ axes[:, 2]
     values = np.concatenate([give, above[..., None]], axis=-1)
     on = pressed & ~slides
@@ -83,8 +83,12 @@ def held(rows: ContactRows, listed: Listed, at: Array, axes: Array) -> Held:
         np.einsum("...sk,...sv->...kv", weight, values),
         np.einsum("...sk,...sl->...kl", weight, listed.share),
     )
-    firm = np.linalg.det(shared) > SPREAD
-    out = np.linalg.solve(np.where(firm[..., None, None], shared, np.eye(shared.shape[-1])), total)
+    if shared.shape[-1] == 1:
+        firm = shared[..., 0, 0] > SPREAD
+        out = total / np.where(firm[..., None, None], shared, 1.0)
+    else:
+        firm = np.linalg.det(shared) > SPREAD
+        out = np.linalg.solve(np.where(firm[..., None, None], shared, np.eye(shared.shape[-1])), total)
     if not firm.all():
         alone = on[..., None] & (listed.share >= END)
         count = alone.sum(axis=-2)[..., None]

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from pivoting.controller.controller import WrenchController, world_wrench
 from pivoting.controller.kernel import first_calls
 from pivoting.models.contact_rows import ContactRows
-from pivoting.sim.contact_readings import FIELDS, ContactReadings, Declared, list_contacts, read_contacts
+from pivoting.sim.contact_readings import ContactReadings, Declared, list_contacts, read_contacts
 from pivoting.sim.control import Answers, Control, States
 from pivoting.sim.fidelity import Held, held
 
 Array = NDArray[np.float64]
 POSE = ("position", "quaternion", "velocity", "angular_velocity")
-BLOCK = 50_000  # worlds times steps whose contacts are sorted at once
+BLOCK = 16_000  # worlds times steps whose contacts are sorted at once: what stays in the caches
 
 
 class Log(NamedTuple):
@@ -67,7 +67,7 @@ class ContactLog:
         at = self._declared.touch(*(states[..., self._where[key]] for key in POSE[:2]))
         sensed, touching = (contacts[..., self._where[key]] for key in ("contacts", "touching"))
         listed = list_contacts(sensed, at, self._declared)
-        found = sensed[..., ::FIELDS].max(axis=-1)
+        found = sensed[..., 0]
         self._keep(first, self.readings, read_contacts(listed, found, touching, self._declared))
         if self._rows is not None:
             self._keep(first, self.held, held(self._rows, listed, at, self._axes))
@@ -117,11 +117,13 @@ def run_steps(
     kept[0] = sensordata[:, : pose.stop]
     report, first = max(1, steps // 100), 0
     start = perf_counter()
-    for k in range(steps):
+    before: Array | None = None
+    for k, answers in enumerate(map(Answers, *out)):
         tick = perf_counter_ns()
-        control(k, states, out.wrench[k - 1] if k else None, Answers(*(values[k] for values in out)))
+        control(k, states, before, answers)
         spent[k] = perf_counter_ns() - tick
-        world_wrench(belief.wrench_map, states.orientation, out.wrench[k], wrench_world[k])
+        before = answers.wrench
+        world_wrench(belief.wrench_map, states.orientation, before, wrench_world[k])
         xfrc[:] = wrench_world[k]
         batch.step(stage=stage)
         kept[k + 1] = sensordata[:, : pose.stop]
