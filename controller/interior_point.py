@@ -13,7 +13,7 @@ from pivoting.controller.kernel import kernel, subroutine
 from pivoting.controller.polish import gradient, polish, release
 from pivoting.controller.scaling import correct, predict
 from pivoting.controller.spatial_form import APEX, EDGE, FLOOR, INSIDE, RIM, spatial_force
-from pivoting.controller.workspace import DQ, P, Q, Work
+from pivoting.controller.workspace import DQ, P, Q, opened
 
 ITERATIONS = 60  # bound; 6 to 12 are usual
 GUESSES = 3  # polishes of one iterate, each on the pieces that the one before asked for
@@ -31,11 +31,10 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no
 
     Args:
         J: (nw, n); b: (nw,) [N, N m]; Q_w: (nw, nw); Q_f: (n, n); mu (planned), f_min [N]: (K,).
-        scratch: the values of a `Work`, see `workspace`.
+        scratch: of `workspace`.
     """
-    work, n, K = Work(*scratch), f.shape[0], mu.shape[0]
-    axes, h, now, best = work.axes, work.h, work.now, np.inf
-    size = reduce(J, b, Q_w, Q_f, work.H, h, work.x)
+    n, K, H, h, pull = f.shape[0], mu.shape[0], scratch[1][0], scratch[2][0], scratch[3][1:]
+    best, piece, size = np.inf, INSIDE, reduce(J, b, Q_w, Q_f, H, h, scratch[2][1])
     for i in range(K):
         size += mu[i] + f_min[i]
     for i in range(n):
@@ -45,9 +44,16 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no
     if not np.isfinite(size):
         return np.nan
     if n == 3:  # exact up to eps cond(H): most problems need no more
-        best = _closed_form(J, b, Q_w, Q_f, mu, f_min, f, w, work)
-        if best > EXACT:
-            best = _try(J, b, Q_w, Q_f, mu, f_min, axes, 1, f, w, best, work)
+        piece, best = _closed_form(J, b, Q_w, Q_f, H, h, mu, f_min, f, w, pull)
+        if best <= EXACT:
+            return best
+    work = opened(scratch)
+    axes, now = work.axes, work.now
+    if n == 3:
+        work.piece[0] = piece
+        for i in range(n):
+            now[i] = f[i]
+        best = _try(J, b, Q_w, Q_f, mu, f_min, axes, 1, f, w, best, work)
         if best <= EXACT:
             return best
     if _nothing_pulls(h, mu, f_min, axes):  # f = 0 is optimal, exactly
@@ -90,14 +96,12 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no
 
 
 @subroutine
-def _closed_form(J, b, Q_w, Q_f, mu, f_min, f, w, work):  # type: ignore[no-untyped-def]
-    """One contact in space: its optimum, which is also the iterate, its piece, and its certificate."""
-    work.piece[0] = spatial_force(work.H, work.h, mu[0], f_min[0], f)
+def _closed_form(J, b, Q_w, Q_f, H, h, mu, f_min, f, w, pull):  # type: ignore[no-untyped-def]
+    """One contact in space: write its optimum; its piece, and its certificate."""
+    piece = spatial_force(H, h, mu[0], f_min[0], f)
     balancing_wrench(J, b, f, w)
-    for i in range(3):
-        work.now[i] = f[i]
-    residual = kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, work.pull)
-    return residual if np.isfinite(residual) else np.inf  # of an H that rounding made indefinite
+    residual = kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, pull)
+    return piece, residual if np.isfinite(residual) else np.inf  # of an H that rounding made indefinite
 
 
 @subroutine

@@ -11,7 +11,7 @@ from pivoting.controller.interior_point import contact_wrench
 from pivoting.controller.kernel import kernel
 from pivoting.controller.polish import polish
 from pivoting.controller.spatial_form import spatial_force
-from pivoting.controller.workspace import Work, workspace
+from pivoting.controller.workspace import opened, workspace
 from scipy import sparse
 
 SETS = ("scattered", "line", "point", "face", "plane", "edge")
@@ -154,7 +154,7 @@ def closed_form_residuals(many: Data) -> np.ndarray:
 
 @kernel
 def _closed_form(J, b, Q_w, Q_f, mu, f_min, residual, f, w, scratch):  # type: ignore[no-untyped-def]
-    work = Work(*scratch)
+    work = opened(scratch)
     for i in range(J.shape[0]):
         reduce(J[i], b[i], Q_w[i], Q_f[i], work.H, work.h, work.x)
         work.piece[0] = spatial_force(work.H, work.h, mu[i, 0], f_min[i, 0], f)
