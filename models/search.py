@@ -15,17 +15,23 @@ FACETS = 50  # of a hull, on which a wide range is looked for
 
 
 def search(
-    body: Hull, contact: str | ArrayLike, arc: Arc | None, now: Array | None, shown: Shown = as_compiled
+    body: Hull,
+    contact: str | ArrayLike,
+    arc: Arc | None,
+    now: Array | None,
+    shown: Shown = as_compiled,
+    stands: bool = True,
 ) -> Iterator[Stance]:
-    """The contacts that are such and allow the arc, the first to be taken."""
+    """The contacts that are such and allow the arc, the first to be taken; see `candidates.stance`."""
     least = LEAST if arc is None else max(LEAST, arc.least)
     if not isinstance(contact, str):
         found = _by_hand(body, held_by_hand(body, contact, shown), least, now)
     elif contact == "lowest" and now is not None:
         found = _lowest(body, least, now)
     elif contact in ("vertex", "edge"):
-        up = None if now is None else now[2]
-        found = _tilts(body, contact, least, faces(body, promising(body, contact, least), up), now)
+        kept = now if stands else None
+        some = faces(body, promising(body, contact, least), None if kept is None else kept[2])
+        found = _tilts(body, contact, least, some, kept)
     else:
         raise ModelError(f"contact = {contact!r}: must be {ALLOWED}")
     return (one for one in found if arc is None or arc.within(one.range[1]))

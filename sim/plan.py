@@ -12,7 +12,7 @@ from pivoting.models.candidates import planar_stance, stance
 from pivoting.models.frames import matrix, quaternion
 from pivoting.models.given import NEAR
 from pivoting.models.grip import grip
-from pivoting.models.hull import body_size
+from pivoting.models.hull import body_size, read_hull
 from pivoting.models.naming import ModelError, label
 from pivoting.models.reading import RigidBody, file_frame, initial_data, place, read_body
 from pivoting.models.tilt import Arc, Stance
@@ -23,6 +23,7 @@ from pivoting.sim.scenario import PACE, Scenario
 from pivoting.sim.strays import refuse_strays
 
 Array = NDArray[np.float64]
+HOVERS = 1.0  # of its size: what is farther above its support in the file stands on nothing there
 WAY = 9  # angles of an arc at which the object may touch nothing else
 ANY = Load(1e-6, 1.0, 1e-6)  # so small that nothing that is relative to it is too large
 
@@ -115,6 +116,8 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody, unit: float
     origin, axes = file_frame(model, body.index)
     contact = case.contact if isinstance(case.contact, str) else _in_body_frame(case.contact, (origin, axes))
     arc = None if case.about == "yaw" else _arc(case)
+    hull, up = read_hull(model, body.index), table[:, 2]
+    over = float(up @ (data.xpos[body.index] - body.origin) + hull.least(up @ now).min())
     found = stance(
         model,
         body.index,
@@ -122,6 +125,7 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody, unit: float
         quaternion(now),
         body.table,
         arc=arc,
+        stands=over <= HOVERS * hull.size,
         gripped=None if case.about == "yaw" else grip(model, body, arc),
         misfit=(lambda one: "") if arc is None else partial(_misfit, model, initial_data(model), body, unit, arc),
         shown=lambda points: (points - origin) @ axes,

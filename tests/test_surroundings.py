@@ -61,3 +61,9 @@ def test_it_is_turned_as_it_stands_in_the_file_where_that_can_be(contact: str, t
 def test_what_is_laid_on_another_side_is_said(tmp_path: Path) -> None:
     done = run(tmp_path, FLOOR + SHELF + BOX.format("0 0 .06"), "edge")
     assert done.object["laid_over_deg"] == pytest.approx(90.0)
+
+
+def test_what_hovers_far_above_stands_on_nothing(tmp_path: Path) -> None:
+    """It is laid down as it rests best; a little above, it is turned as it stands."""
+    assert run(tmp_path, FLOOR + BOX.format("0 0 .08"), "edge").object["laid_over_deg"] == 0.0
+    assert run(tmp_path, FLOOR + BOX.format("0 0 .4"), "edge").object["laid_over_deg"] == pytest.approx(90.0)
