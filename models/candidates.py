@@ -55,7 +55,7 @@ def stance(
     table: ArrayLike = (1.0, 0.0, 0.0, 0.0),
     *,
     arc: Arc | None = None,
-    stands: bool = True,
+    height: float = 0.0,
     gripped: Gripped | None = None,
     misfit: Misfit = lambda one: "",
     shown: Shown = as_compiled,
@@ -80,7 +80,7 @@ def stance(
             corners lie on the face that the body has down in it, if they are of that.
         table: (4,) table frame (t, o, n) to world, that goes with it.
         arc: the angles that it has to allow; by default any range will do.
-        stands: whether it stands in that orientation, so that a vertex or an edge is looked for there first.
+        height: of the body's origin above the table in that orientation [m]; see `faces.standing`.
         gripped: how the simulator holds a contact, see `models.grip`, which prefers what is held firmly, and refuses
             edges that are not; by default everything is.
         misfit: why a contact cannot be had where the body stands, which is then passed over; by default all can.
@@ -95,7 +95,7 @@ def stance(
     one = alternating = None
     reason = told = ""
     try:
-        one, alternating, told = _chosen(search(body, contact, arc, now, shown, stands), gripped, misfit)
+        one, alternating, told = _chosen(search(body, contact, arc, now, shown, height), gripped, misfit)
     except ModelError as error:
         if not isinstance(contact, str) or contact != "lowest":
             raise
@@ -103,11 +103,9 @@ def stance(
     if one is not None:
         return replace(one, face=_down(body, one))
     if not reason:
-        first = next(search(body, contact, None, now, shown, stands), None)
-        if first is not None and not isinstance(
-            contact, str
-        ):  # of its faces, that from which it can be turned farthest
-            first = max(search(body, contact, None, now, shown), key=lambda one: one.range[1])
+        met = search(body, contact, None, now, shown, height)
+        some = islice(met, 1) if isinstance(contact, str) else met  # of a given contact all faces
+        first = max(some, key=lambda one: one.range[1], default=None)
         if told:
             reason = told
         elif alternating is not None:

@@ -9,6 +9,7 @@ from pivoting.models.frames import Array
 from pivoting.models.hull import Hull, Indices, outline
 from pivoting.models.naming import ModelError
 
+HOVERS = 1.0  # of its size: a body that is farther above a table stands on nothing there
 SAME = 1e-9  # 1 - cos of the angle between the normals of one face
 SLACK = 0.9  # of a range asked for: a bound is of facets that were merged within a tolerance
 
@@ -36,6 +37,15 @@ def face(body: Hull, up: Array) -> Face | None:
         return None
     around = outline(points, body.reach)
     return Face(up, points, owner, around) if body.lies(owner[around]) else None
+
+
+def standing(body: Hull, up: Array, height: float) -> Array | None:
+    """The normal `up` (3,) of a table, body frame, on which the body stands, or None where it hovers too far above it.
+
+    Args:
+        height: of the body frame's origin above the table [m].
+    """
+    return up if height + body.least(up).min() <= HOVERS * body.size else None
 
 
 def faces(body: Hull, some: Indices | NDArray[np.bool_], now: Array | None = None) -> Iterator[Face]:

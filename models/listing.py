@@ -6,7 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from pivoting.models.candidates import planar_stance
-from pivoting.models.faces import faces, promising
+from pivoting.models.faces import faces, promising, standing
 from pivoting.models.frames import matrix
 from pivoting.models.given import Shown, as_compiled, written
 from pivoting.models.grip import Grip, grip
@@ -54,8 +54,10 @@ def contacts(
     if body.dim == 2:
         return [one for one in [_planar(model, body, shown)] if one.most >= least]
     hull, gripped = read_hull(model, body.index), grip(model, body)
-    up = matrix(body.table)[:, 2] @ initial_data(model).xmat[body.index].reshape(3, 3)
-    met = list(faces(hull, promising(hull, "vertex", least) | promising(hull, "edge", least), up))
+    data, up = initial_data(model), matrix(body.table)[:, 2]
+    height = float(up @ (data.xpos[body.index] - body.origin))
+    stands = standing(hull, up @ data.xmat[body.index].reshape(3, 3), height)
+    met = list(faces(hull, promising(hull, "vertex", least) | promising(hull, "edge", least), stands))
     longest: dict[str, float] = {}
     found: list[Candidate] = []
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pivoting.models.faces import SAME, SLACK, Face, face, faces, middle, promising
+from pivoting.models.faces import SAME, SLACK, Face, face, faces, middle, promising, standing
 from pivoting.models.frames import Array
 from pivoting.models.given import ALLOWED, Shown, as_compiled, held_by_hand
 from pivoting.models.hull import Hull, Indices
@@ -20,7 +20,7 @@ def search(
     arc: Arc | None,
     now: Array | None,
     shown: Shown = as_compiled,
-    stands: bool = True,
+    height: float = 0.0,
 ) -> Iterator[Stance]:
     """The contacts that are such and allow the arc, the first to be taken; see `candidates.stance`."""
     least = LEAST if arc is None else max(LEAST, arc.least)
@@ -29,9 +29,8 @@ def search(
     elif contact == "lowest" and now is not None:
         found = _lowest(body, least, now)
     elif contact in ("vertex", "edge"):
-        kept = now if stands else None
-        some = faces(body, promising(body, contact, least), None if kept is None else kept[2])
-        found = _tilts(body, contact, least, some, kept)
+        up = None if now is None else standing(body, now[2], height)
+        found = _tilts(body, contact, least, faces(body, promising(body, contact, least), up), now)
     else:
         raise ModelError(f"contact = {contact!r}: must be {ALLOWED}")
     return (one for one in found if arc is None or arc.within(one.range[1]))
@@ -44,8 +43,8 @@ def _tilts(body: Hull, kind: str, least: float, found: Iterable[Face], now: Arra
     """
     met: list[tuple[Face, Array | None]] = []
     for one in found:
-        stands = now is not None and one.up @ now[2] > 1.0 - SAME  # as it does now: its yaw is kept
-        met.append((one, now if stands else None))
+        as_now = now is not None and one.up @ now[2] > 1.0 - SAME  # then its yaw is kept, too
+        met.append((one, now if as_now else None))
         yield from on_face(body, one, kind, least, met[-1][1])
     if kind == "vertex":
         for one, kept in met:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.so3 import rotated
+from pivoting.controller.space import components, cross, stacked
 
 Array = NDArray[np.float64]
 NOTHING = 1e-9  # of the forces at work: less is what rounding leaves of them
@@ -97,14 +98,6 @@ class Declared:
         return np.eye(at.shape[-2])[away.argmin(axis=-1)], away.min(axis=-1)
 
 
-def crossed(a: Array, b: Array) -> Array:
-    """a x b of vectors (..., 3); a third of the time of np.cross."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        out[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
-    return out
-
-
 def list_contacts(sensed: Array, at: Array, declared: Declared) -> Listed:
     """The contacts of the object with its support.
 
@@ -124,7 +117,7 @@ def list_contacts(sensed: Array, at: Array, declared: Declared) -> Listed:
         local=contacts[..., 1:4],
         normal=normal,
         tangent=tangent,
-        other=crossed(normal, tangent),
+        other=stacked(list(cross(*components(normal), *components(tangent)))),
         position=contacts[..., 5:8],
         depth=-contacts[..., 4],
     )

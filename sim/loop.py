@@ -336,12 +336,7 @@ def _desired(case: Scenario, plan: Plan, time: Array) -> tuple[Samples, Samples,
 
     Checked: whatever it says of itself, it has to keep the object on its contact.
     """
-    angle, rate, acceleration = (np.array(values, dtype=float) for values in case.motion(time))
-    for name, values in (("angle", angle), ("rate", rate), ("acceleration", acceleration)):
-        if values.shape != time.shape or not np.isfinite(values).all():
-            raise fail(
-                "reference", f"{name} of shape {values.shape}", f"finite and of the shape of the times, {time.shape}"
-            )
+    angle, rate, acceleration = case.samples(time)
     low, high = np.rad2deg([angle.min(), angle.max()])
     least, most = np.rad2deg(plan.range)
     if not least - 1e-9 <= low <= high <= most + 1e-9:

@@ -12,7 +12,7 @@ from pivoting.models.candidates import planar_stance, stance
 from pivoting.models.frames import matrix, quaternion
 from pivoting.models.given import NEAR
 from pivoting.models.grip import grip
-from pivoting.models.hull import body_size, read_hull
+from pivoting.models.hull import body_size
 from pivoting.models.naming import ModelError, label
 from pivoting.models.reading import RigidBody, file_frame, initial_data, place, read_body
 from pivoting.models.tilt import Arc, Stance
@@ -23,7 +23,6 @@ from pivoting.sim.scenario import PACE, Scenario
 from pivoting.sim.strays import refuse_strays
 
 Array = NDArray[np.float64]
-HOVERS = 1.0  # of its size: what is farther above its support in the file stands on nothing there
 WAY = 9  # angles of an arc at which the object may touch nothing else
 ANY = Load(1e-6, 1.0, 1e-6)  # so small that nothing that is relative to it is too large
 
@@ -72,9 +71,9 @@ def planned(case: Scenario, model: mujoco.MjModel, unit: float = 1.0) -> Plan:
     body = read_body(model, case.body, case.support)
     size = body_size(model, body.index)
     _refuse_beside(model, body, initial_data(model).xipos[body.index], size, "its centre of mass", unit)
-    found = _planar(case, model, body) if body.dim == 2 else _spatial(case, model, body, unit)
-    held = (found.contacts - found.contacts[0]) @ (matrix(found.start) @ matrix(body.axes).T).T
-    _refuse_beside(model, body, found.at + held, NEAR * size, "the contact", unit)
+    near = NEAR * size
+    found = _planar(case, model, body) if body.dim == 2 else _spatial(case, model, body, near, unit)
+    _refuse_contacts_beside(model, body, found.at, found.contacts, found.start, near, unit)
     away = np.linalg.norm(found.contacts - stepped_point(model, body.index), axis=1) + found.radius
     return replace(found, arm=float(away.max()), unit=unit)
 
@@ -85,6 +84,14 @@ def _refuse_beside(model: mujoco.MjModel, body: RigidBody, at: Array, allowed: f
     if over > allowed:
         told = f"{what} would be {over * unit:.3g} m beside its upper face"
         raise ModelError(f"support = {label(model, body.support)}: {told}; must be under the body")
+
+
+def _refuse_contacts_beside(
+    model: mujoco.MjModel, body: RigidBody, at: Array, contacts: Array, start: Array, near: float, unit: float
+) -> None:
+    """Contacts (K, 3), of which the first is `at` (3,) where the object has the orientation `start` (4,) likewise."""
+    held = (contacts - contacts[0]) @ (matrix(start) @ matrix(body.axes).T).T
+    _refuse_beside(model, body, at + held, near, "the contact", unit)
 
 
 def transplanted(plan: Plan, model: mujoco.MjModel, body: RigidBody, grown: float) -> Plan:
@@ -108,7 +115,7 @@ def transplanted(plan: Plan, model: mujoco.MjModel, body: RigidBody, grown: floa
     )
 
 
-def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody, unit: float) -> Plan:
+def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody, near: float, unit: float) -> Plan:
     """In space the contacts are found on the object, as `models.candidates.stance` does."""
     table, gap = matrix(body.table), np.deg2rad(LOWEST)
     data = initial_data(model)
@@ -116,8 +123,6 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody, unit: float
     origin, axes = file_frame(model, body.index)
     contact = case.contact if isinstance(case.contact, str) else _in_body_frame(case.contact, (origin, axes))
     arc = None if case.about == "yaw" else _arc(case)
-    hull, up = read_hull(model, body.index), table[:, 2]
-    over = float(up @ (data.xpos[body.index] - body.origin) + hull.least(up @ now).min())
     found = stance(
         model,
         body.index,
@@ -125,9 +130,9 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody, unit: float
         quaternion(now),
         body.table,
         arc=arc,
-        stands=over <= HOVERS * hull.size,
+        height=float(table[:, 2] @ (data.xpos[body.index] - body.origin)),
         gripped=None if case.about == "yaw" else grip(model, body, arc),
-        misfit=(lambda one: "") if arc is None else partial(_misfit, model, initial_data(model), body, unit, arc),
+        misfit=(lambda one: "") if arc is None else partial(_misfit, model, initial_data(model), body, near, unit, arc),
         shown=lambda points: (points - origin) @ axes,
     )
     start, axis = table @ found.rotation, table @ found.axis
@@ -141,13 +146,14 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody, unit: float
     return Plan(body, found.points, found.radius, at, axis, quaternion(start), limits, found.face)
 
 
-def _misfit(model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody, unit: float, arc: Arc, one: Stance) -> str:
+def _misfit(
+    model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody, near: float, unit: float, arc: Arc, one: Stance
+) -> str:
     """Why a contact cannot be had where the object stands, on the way of an arc about it, or nothing."""
     table, at = matrix(body.table), _below(model, body, one.points[0])
-    held = (one.points - one.points[0]) @ (table @ one.rotation @ matrix(body.axes).T).T
     start = quaternion(table @ one.rotation)
     try:
-        _refuse_beside(model, body, at + held, NEAR * body_size(model, body.index), "the contact", unit)
+        _refuse_contacts_beside(model, body, at, one.points, start, near, unit)
         for theta in np.linspace(arc.theta, arc.theta_end, WAY):
             turned = quaternion_product(exponential(theta * (table @ one.axis)), start)
             place(model, data, body, turned, one.points[0], at + one.radius[0] * table[:, 2])

@@ -25,14 +25,8 @@ _SAID = {  # of it otherwise, or not at all
     "f_min_N": "pressed with",
     "laid_over_deg": "laid on another side than in the file, over by",
 }
-_UNITS = {
-    "kg_m2": "kg m^2",
-    "kg": "kg",
-    "m": "m",
-    "s": "s",
-    "N": "N",
-    "deg": "deg",
-}  # with which a name in the summary may end
+# with which a name in the summary may end
+_UNITS = {"kg_m2": "kg m^2", **{unit: unit for unit in ("kg", "m", "s", "N", "deg")}}
 
 # name in the summary: (what people read, factor, unit)
 _LINES = {

@@ -218,7 +218,20 @@ class Scenario:
     def pace(self) -> tuple[Array, Array]:
         """Times and the rates of turn at them, (N,) [s] and [rad/s], of a scenario whose motion is `absolute`."""
         times = np.linspace(0.0, self.duration, PACE)
-        return times, np.array(self.motion(times)[1], dtype=float)
+        return times, self.samples(times)[1]
+
+    def samples(self, times: Array) -> tuple[Array, Array, Array]:
+        """Angles [rad], rates and accelerations (N,) at times (N,) [s], of a scenario whose motion is `absolute`.
+
+        Raises:
+            ValueError: a reference of a user's own gives others than these.
+        """
+        angle, rate, acceleration = (np.array(values, dtype=float) for values in self.motion(times))
+        for name, values in (("angle", angle), ("rate", rate), ("acceleration", acceleration)):
+            if values.shape != times.shape or not np.isfinite(values).all():
+                allowed = f"finite and of the shape of the times, {times.shape}"
+                raise fail("reference", f"{name} of shape {values.shape}", allowed)
+        return angle, rate, acceleration
 
     def bounds(self, unit: float = 1.0) -> WrenchBounds:
         """On the wrench, of a scenario that is `absolute`; without any, one that bounds nothing.

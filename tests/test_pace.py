@@ -67,3 +67,10 @@ def test_by_hand(tmp_path: Path) -> None:
     arm = np.linalg.norm(run.truth.com + run.points, axis=1).max()
     wanted = run.truth.mass * fastest**2 * arm / 7.0
     assert run.contact_settings["f_min_N"] == pytest.approx(wanted, rel=1e-5)
+
+
+def test_a_reference_that_is_not_finite_is_named(tmp_path: Path) -> None:
+    """And not what would follow from it, such as a floor of nan."""
+    case = own(tmp_path, mjcf()).change(reference=lambda t: (0.1 + 0.0 * np.asarray(t), *2 * [np.nan * np.asarray(t)]))
+    with pytest.raises(ValueError, match=r"reference = 'rate of shape .*must be finite"):
+        simulate(case)
