@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.so3 import rotated
-from pivoting.controller.space import components, cross, stacked
 
 Array = NDArray[np.float64]
 NOTHING = 1e-9  # of the forces at work: less is what rounding leaves of them
@@ -117,7 +116,7 @@ def list_contacts(sensed: Array, at: Array, declared: Declared) -> Listed:
         local=contacts[..., 1:4],
         normal=normal,
         tangent=tangent,
-        other=stacked(list(cross(*components(normal), *components(tangent)))),
+        other=np.cross(normal, tangent),
         position=contacts[..., 5:8],
         depth=-contacts[..., 4],
     )
