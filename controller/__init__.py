@@ -6,7 +6,7 @@ from pivoting.controller.kernel import CACHE
 from pivoting.controller.stale import drop_stale_kernels
 
 if CACHE is not None:
-    drop_stale_kernels(Path(__file__).parent, CACHE)  # before any kernel is loaded
+    drop_stale_kernels(CACHE, Path(__file__).parent)  # before any kernel is loaded
 
 from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.conic import ClarabelWorkspace

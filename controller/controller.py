@@ -24,7 +24,7 @@ from pivoting.controller.interior_point import contact_wrench
 from pivoting.controller.kernel import kernel
 from pivoting.controller.laws import Body, Law, fill_required
 from pivoting.controller.problem import WrenchProblem, wrench_weight
-from pivoting.controller.space import IDENTITY, Motion, Space, cross, fill_rotation, rotation_matrix, space
+from pivoting.controller.space import IDENTITY, Motion, Space, fill_rotation, rotation_matrix, space, turned
 from pivoting.controller.units import Units, lever, units
 from pivoting.controller.validate import Array, array, fail, number, positive_definite
 from pivoting.controller.workspace import workspace
@@ -292,16 +292,12 @@ def world_wrench(wrench_map, q, wrench, out):  # type: ignore[no-untyped-def]
         out: (W, 6), written; zero where the wrench is not finite: without an answer nothing is applied.
     """
     for i in range(q.shape[0]):
-        w, x, y, z = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
-        s = 2.0 / (w * w + x * x + y * y + z * z)
         for half in (0, 3):
             a = b = c = 0.0
             for j in range(wrench.shape[1]):
                 a += wrench_map[j, half] * wrench[i, j]
                 b += wrench_map[j, half + 1] * wrench[i, j]
                 c += wrench_map[j, half + 2] * wrench[i, j]
-            t, u, v = cross(x, y, z, a, b, c)
-            d, e, f = cross(x, y, z, t, u, v)
-            a, b, c = a + s * (w * t + d), b + s * (w * u + e), c + s * (w * v + f)
+            a, b, c = turned(q[i, 0], q[i, 1], q[i, 2], q[i, 3], a, b, c)
             finite = np.isfinite(a + b + c)
             out[i, half], out[i, half + 1], out[i, half + 2] = (a, b, c) if finite else (0.0, 0.0, 0.0)

@@ -15,18 +15,9 @@ from typing import Any
 
 from numba import njit
 from numba.extending import register_jitable
+from pivoting.controller.stale import cache_folder
 
-
-def _cache_folder() -> Path | None:
-    """Where numba keeps what it compiles of this room: NUMBA_CACHE_DIR, else beside the sources, else in the user's
-    cache; None where it can write to none of them, and would raise for each function that asks for a cache."""
-    try:
-        return Path(njit(cache=True)(_cache_folder).stats.cache_path)
-    except RuntimeError:
-        return None
-
-
-CACHE = _cache_folder()
+CACHE = cache_folder(Path(__file__).parent)
 CACHED = CACHE is not None
 
 _common: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}

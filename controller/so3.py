@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 from pivoting.controller.kernel import kernel, subroutine
-from pivoting.controller.space import components, fill_product, rotation_error, stacked
+from pivoting.controller.space import components, fill_product, rotation_error, stacked, turned
 from pivoting.controller.validate import Array
 
 _SMALL = 1e-4  # [rad]: below, the series is more accurate than the quotient
@@ -23,9 +23,7 @@ def turn(orientation, vector, out):  # type: ignore[no-untyped-def]
 
 def rotated(orientation: ArrayLike, point: ArrayLike) -> Array:
     """(..., 3) points turned by unit quaternions (..., 4), shapes broadcast."""
-    (w, a, b, c), (x, y, z) = components(orientation), components(point)
-    t, u, v = 2.0 * (b * z - c * y), 2.0 * (c * x - a * z), 2.0 * (a * y - b * x)  # twice axis x point
-    return stacked([x + w * t + b * v - c * u, y + w * u + c * t - a * v, z + w * v + a * u - b * t])
+    return stacked(list(turned(*components(orientation), *components(point))))
 
 
 def exponential(vector: Array) -> Array:

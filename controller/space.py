@@ -162,6 +162,15 @@ def cross(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
 
 
 @subroutine
+def turned(w, x, y, z, a, b, c):  # type: ignore[no-untyped-def]
+    """The vector (a, b, c) turned by a quaternion, which need not be exactly of unit length, as three scalars."""
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    t, u, v = cross(x, y, z, a, b, c)
+    d, e, f = cross(x, y, z, t, u, v)
+    return a + s * (w * t + d), b + s * (w * u + e), c + s * (w * v + f)
+
+
+@subroutine
 def component(wrench_map, row, F0, F1, F2, M0, M1, M2):  # type: ignore[no-untyped-def]
     """One of the nw components that are used of a wrench (F, M) in 3-D."""
     m = wrench_map[row]

@@ -7,16 +7,31 @@ import hashlib
 import os
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
+
+from numba import njit
 
 
-def drop_stale_kernels(room: Path, cache: Path) -> list[Path]:
-    """Remove the kernels compiled into the folder `cache` of other sources than `room` has now; returns what went.
+def cache_folder(room: Path) -> Path | None:
+    """Where numba keeps what it compiles of a room: NUMBA_CACHE_DIR, else beside the sources, else in the user's cache;
+    None where it can write to none of them, and would raise for each function that asks for a cache."""
+    function: dict[str, Any] = {}
+    exec(compile("def anything(): pass", str(room / "__init__.py"), "exec"), function)
+    try:
+        return Path(njit(cache=True)(function["anything"]).stats.cache_path)
+    except RuntimeError:
+        return None
+
+
+def drop_stale_kernels(cache: Path, *rooms: Path) -> list[Path]:
+    """Remove the kernels compiled into the folder `cache` of other sources than these rooms have; returns what went.
 
     Sources are told apart by what they say: dates of installed files need not grow from one version to the next.
     """
     digest = hashlib.sha256()
-    for source in sorted(room.glob("*.py")):
-        digest.update(source.name.encode() + b"\0" + hashlib.sha256(source.read_bytes()).digest())
+    for room in rooms:
+        for source in sorted(room.rglob("*.py")):
+            digest.update(str(source.relative_to(room)).encode() + b"\0" + hashlib.sha256(source.read_bytes()).digest())
     now, kept = digest.hexdigest(), cache / "kernels.sha256"
     with suppress(FileNotFoundError):
         if kept.read_text() == now:

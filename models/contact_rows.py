@@ -55,12 +55,7 @@ class ContactRows(NamedTuple):
 
     def impedance(self, depth: Array) -> Array:
         """d (...) at depths (...) below the margin [m]."""
-        low, high, width, middle, power = self.solimp
-        if low == high:
-            return np.full(np.shape(depth), low)
-        x = np.clip(np.asarray(depth) / width, 0.0, 1.0)
-        up, down = x**power / middle ** (power - 1.0), (1.0 - x) ** power / (1.0 - middle) ** (power - 1.0)
-        return np.asarray(low + (high - low) * np.where(x <= middle, up, 1.0 - down))
+        return impedance(np.asarray(depth), *self.solimp)
 
     def softness(self, depth: Array) -> Array:
         """R / D = (1 - d) / d (...) at depths (...) below the margin [m]."""
@@ -80,6 +75,14 @@ class ContactRows(NamedTuple):
             soft = self.impedance(middle) * middle < push * self.softness(middle)
             low, high = np.where(soft, middle, low), np.where(soft, high, middle)
         return high
+
+
+def impedance(depth: Any, low: Any, high: Any, width: Any, middle: Any, power: Any) -> Any:
+    """d of a contact at a depth below its margin [m] by the five of MuJoCo's `solimp`; of arrays or compiled floats."""
+    x = np.minimum(np.maximum(depth / width, 0.0), 1.0)
+    rising, left = np.minimum(x, middle), 1.0 - np.maximum(x, middle)
+    risen = rising**power / middle ** (power - 1.0) + (1.0 - middle) - left**power / (1.0 - middle) ** (power - 1.0)
+    return low + (high - low) * risen
 
 
 def read_rows(model: mujoco.MjModel, body: int, support: int, placements: Iterable[Array]) -> ContactRows | None:

@@ -8,7 +8,8 @@ from pivoting.models.reading import file_frame, read_body
 from pivoting.models.scenes import Scene
 
 SITE = "pivoting/object"  # object axes at the centre of mass
-CONTACTS, SLOTS = 8, 64  # contacts of one geom with its support, at most; those that are listed, at most
+ON_PLANE, CONTACTS = 4, 8  # contacts of one geom with its support, at most: with a plane, with another geom
+SLOTS = 64  # contacts that are listed, at most
 
 
 def instrument(scene: Scene) -> tuple[mujoco.MjModel, dict[str, slice]]:
@@ -38,7 +39,8 @@ def instrument(scene: Scene) -> tuple[mujoco.MjModel, dict[str, slice]]:
     for name, kind in kinds.items():
         spec.add_sensor(name=f"pivoting/{name}", type=kind, **at_site)
     touched = {"reftype": mujoco.mjtObj.mjOBJ_BODY, "refname": scene.body}
-    slots = min(CONTACTS * int(bare.body_geomnum[body.index]), SLOTS)
+    plane = int(bare.geom_type[body.support]) == int(mujoco.mjtGeom.mjGEOM_PLANE)
+    slots = min((ON_PLANE if plane else CONTACTS) * int(bare.body_geomnum[body.index]), SLOTS)
     spec.add_sensor(
         name="pivoting/contacts",
         type=mujoco.mjtSensor.mjSENS_CONTACT,

@@ -1,5 +1,12 @@
 """The closed loop: worlds, monitor and verdict, recording, command line."""
 
+from pathlib import Path
+
+from pivoting.controller.stale import cache_folder, drop_stale_kernels
+
+if (_cache := cache_folder(Path(__file__).parent)) is not None:  # before any kernel is loaded
+    drop_stale_kernels(_cache, *(Path(__file__).parents[1] / room for room in ("controller", "models", "sim")))
+
 from pivoting.sim.attach import Attached, ControlError, attach
 from pivoting.sim.loop import simulate
 from pivoting.sim.run import Run

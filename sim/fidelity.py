@@ -18,19 +18,22 @@ body's turn are those of the run; where the contact went along the table is not 
 contact slides, and none holds one that has opened: the drift is then unknown. docs/fidelity.md derives and measures it.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.models.contact_rows import ContactRows
-from pivoting.sim.contact_readings import Listed
+from pivoting.controller.kernel import subroutine
+from pivoting.models.contact_rows import ContactRows, impedance
 
 Array = NDArray[np.float64]
 SLIDES = 1.0 - 1e-9  # of its friction: MuJoCo's cone is exact to rounding
 SPREAD = 1e-4  # determinant of the contacts' shares, below which they are all at one place of an edge
 END = 0.98  # least share of a contact that alone holds an end of an edge
+TINY = 1e-300
 UNHELD = 10  # steps on end that an end of an edge may be without contact while another contact holds
+
+_impedance = subroutine(impedance)
 
 
 class Held(NamedTuple):
@@ -54,47 +57,135 @@ def stepped_point(model: mujoco.MjModel, body: int) -> Array:
     return np.zeros(3) if free else np.array(model.jnt_pos[joint])
 
 
-def held(rows: ContactRows, listed: Listed, at: Array, axes: Array) -> Held:
-    """What the rows of listed contacts do at the declared ones.
+class Rows(NamedTuple):
+    """What of `ContactRows` the compiled sum over contacts needs: numbers, for arrays take longer to compile.
 
-    The object is rigid, so that along an edge it all is linear in the place.
+    Attributes:
+        pyramidal, solimp, margin: of `ContactRows`.  mu, D: likewise, of both tangents.
+        axes: the table's t, o and n, world axes.
+    """
+
+    pyramidal: bool
+    mu: tuple[float, ...]
+    D: tuple[float, ...]
+    solimp: tuple[float, ...]
+    margin: float
+    axes: tuple[tuple[float, ...], ...]
+
+    @classmethod
+    def of(cls, rows: ContactRows, axes: Array) -> Self:
+        """With the table's (t, o, n) as columns."""
+        mu, D, solimp = (tuple(values.tolist()) for values in (rows.mu, rows.D[1:], rows.solimp))
+        return cls(rows.pyramidal, mu, D, solimp, rows.margin, tuple(tuple(axis) for axis in axes.T.tolist()))
+
+
+class Sums(NamedTuple):
+    """Over the contacts that hold in one step, of K declared ones: scratch.
+
+    Attributes:
+        shared: (3,) of products of the shares that both ends of an edge carry: 0 0, 0 1 and 1 1.
+        total: (K, 3) of (give, above), by shares.
+        alone: (K, 3) of the same, of those that alone hold a declared contact.  number: (K,) how many there are.
+    """
+
+    shared: Array
+    total: Array
+    alone: Array
+    number: Array
+
+    @classmethod
+    def of(cls, contacts: int) -> Self:
+        """Of so many declared ones."""
+        return cls(np.empty(3), np.empty((contacts, 3)), np.empty((contacts, 3)), np.empty(contacts))
+
+
+@subroutine
+def dot(axis, x, y, z):  # type: ignore[no-untyped-def]
+    """Of an axis and (x, y, z)."""
+    return axis[0] * x + axis[1] * y + axis[2] * z
+
+
+@subroutine
+def begin_rows(sums):  # type: ignore[no-untyped-def]
+    """Clear the sums; no contact slides yet."""
+    shared, total, alone, number = sums
+    for i in range(3):
+        shared[i] = 0.0
+    for k in range(total.shape[0]):
+        number[k] = 0.0
+        for i in range(3):
+            total[k, i] = alone[k, i] = 0.0
+    return False
+
+
+@subroutine
+def add_row(rows, push, pulls, depth, where, tangent, other, at, share, sums):  # type: ignore[no-untyped-def]
+    """Add what the rows of one contact do; returns whether it slides, and adds nothing of one that does.
 
     Args:
-        listed: (..., S) contacts.  at: (..., K, 3) where the declared contacts touch, world axes [m].
-        axes: (3, 3) the table's (t, o, n) as columns, world axes.
+        rows: the values of `Rows`.  push, pulls: its force along its normal and both tangents [N].
+        depth: [m].  where: its place [m].  tangent, other: both its tangents.
+        at: (K, 3) where the declared contacts touch [m].  share: (K,) of it that each carries.
+        sums: the values of `Sums`.
     """
-    push, pull = listed.local[..., 0], listed.local[..., 1:]
-    pressed = listed.share.any(axis=-1) & (push > 0.0)
-    use = np.abs(pull) / rows.mu
-    if rows.pyramidal:
-        lean = np.maximum(
-            1.0, (3.0 * use - push[..., None]) / np.where(use > 0.0, use, 1.0)
-        )  # three edges push, not four
-        slides = use.sum(axis=-1) >= SLIDES * push
-    else:
-        lean, slides = np.ones_like(use), (use**2).sum(axis=-1) >= SLIDES * push**2
-    local = rows.softness(listed.depth + rows.margin)[..., None] * lean * rows.D[1:] * pull
-    give = (local[..., :1] * listed.tangent + local[..., 1:] * listed.other) @ axes[:, :2]
-    above = (listed.position - listed.share @ at) @ axes[:, 2]
-    values = np.concatenate([give, above[..., None]], axis=-1)
-    on = pressed & ~slides
-    weight = np.where(on[..., None], listed.share, 0.0)
-    total, shared = (
-        np.einsum("...sk,...sv->...kv", weight, values),
-        np.einsum("...sk,...sl->...kl", weight, listed.share),
-    )
-    if shared.shape[-1] == 1:
-        firm = shared[..., 0, 0] > SPREAD
-        out = total / np.where(firm[..., None, None], shared, 1.0)
-    else:
-        firm = np.linalg.det(shared) > SPREAD
-        out = np.linalg.solve(np.where(firm[..., None, None], shared, np.eye(shared.shape[-1])), total)
-    if not firm.all():
-        alone = on[..., None] & (listed.share >= END)
-        count = alone.sum(axis=-2)[..., None]
-        one = np.einsum("...sk,...sv->...kv", alone.astype(float), values) / np.where(count > 0, count, 1)
-        out = np.where(firm[..., None, None], out, np.where(count > 0, one, np.nan))
-    return Held(out[..., :2], np.nan_to_num(out[..., 2]), (pressed & slides).any(axis=-1))
+    pyramidal, mu, D, solimp, margin, axes = rows
+    shared, total, alone, number = sums
+    K, use, lean = share.shape[0], (abs(pulls[0]) / mu[0], abs(pulls[1]) / mu[1]), (1.0, 1.0)
+    if pyramidal:
+        if use[0] + use[1] >= SLIDES * push:
+            return True
+        # where three edges push, not four, it leans on them
+        lean = max(1.0, 3.0 - push / max(use[0], TINY)), max(1.0, 3.0 - push / max(use[1], TINY))
+    elif use[0] * use[0] + use[1] * use[1] >= SLIDES * push * push:
+        return True
+    d = solimp[0]
+    if solimp[1] != d:  # powers take long
+        d = _impedance(depth + margin, *solimp)
+    soft = (1.0 - d) / d
+    a, b = soft * lean[0] * D[0] * pulls[0], soft * lean[1] * D[1] * pulls[1]
+    x, y, z = a * tangent[0] + b * other[0], a * tangent[1] + b * other[1], a * tangent[2] + b * other[2]
+    give = dot(axes[0], x, y, z), dot(axes[1], x, y, z)
+    x, y, z = where
+    for k in range(K):
+        x, y, z = x - share[k] * at[k, 0], y - share[k] * at[k, 1], z - share[k] * at[k, 2]
+    above = dot(axes[2], x, y, z)
+    shared[0] += share[0] * share[0]
+    shared[1] += share[0] * share[K - 1]
+    shared[2] += share[K - 1] * share[K - 1]
+    for k in range(K):
+        total[k, 0] += share[k] * give[0]
+        total[k, 1] += share[k] * give[1]
+        total[k, 2] += share[k] * above
+        if share[k] >= END:
+            alone[k, 0] += give[0]
+            alone[k, 1] += give[1]
+            alone[k, 2] += above
+            number[k] += 1.0
+    return False
+
+
+@subroutine
+def end_rows(sums, give, above):  # type: ignore[no-untyped-def]
+    """Write what the rows do at the declared contacts, give (K, 2) and above (K,); see `Held`.
+
+    The object is rigid, so that along an edge it all is linear in the place.
+    """
+    shared, total, alone, number = sums
+    K = number.shape[0]
+    determinant = shared[0] * shared[2] - shared[1] * shared[1]
+    for k in range(K):
+        for v in range(3):
+            if K == 2 and determinant > SPREAD:
+                own, cross = (shared[2], shared[1]) if k == 0 else (shared[0], shared[1])
+                value = (own * total[k, v] - cross * total[1 - k, v]) / determinant
+            elif number[k] > 0.0:
+                value = alone[k, v] / number[k]
+            else:
+                value = np.nan if v < 2 else 0.0
+            if v < 2:
+                give[k, v] = value
+            else:
+                above[k] = value
 
 
 @np.errstate(invalid="ignore", over="ignore")

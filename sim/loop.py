@@ -137,8 +137,8 @@ def simulate(
     declared = Declared(
         points=np.array([space(d).lift(truth.point(contact)) for contact in plan.contacts]),
         up=plan.radius[:, None] * matrix(truth.table)[:, 2],
-        across=matrix(truth.table)[:, : d - 1],
-        near=NEAR * body_size(model, truth.index),
+        across=np.ascontiguousarray(matrix(truth.table)[:, : d - 1].T),
+        near=float(NEAR * body_size(model, truth.index)),
         landing=case.limits.contacts_end > 0,
     )
     contacts = ContactLog(declared, rows, matrix(truth.table), where, steps, int(worlds))

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from pivoting.controller.controller import WrenchController, world_wrench
 from pivoting.controller.kernel import first_calls
 from pivoting.models.contact_rows import ContactRows
-from pivoting.sim.contact_readings import ContactReadings, Declared, list_contacts, read_contacts
+from pivoting.sim.contact_readings import ContactReadings, Declared, sort_contacts
 from pivoting.sim.control import Answers, Control, States
-from pivoting.sim.fidelity import Held, held
+from pivoting.sim.fidelity import Held, Rows, Sums
 
 Array = NDArray[np.float64]
 POSE = ("position", "quaternion", "velocity", "angular_velocity")
-BLOCK = 16_000  # worlds times steps whose contacts are sorted at once: what stays in the caches
+BLOCK = 256  # worlds times steps whose contacts are sorted at once: what stays in the caches
 
 
 class Log(NamedTuple):
@@ -42,7 +42,7 @@ class Log(NamedTuple):
 
 
 class ContactLog:
-    """Sorts the contacts of every step, block by block: what MuJoCo lists of them would fill the memory."""
+    """Sorts the contacts of every step, some steps at once: what MuJoCo lists of them all would fill the memory."""
 
     def __init__(
         self,
@@ -53,29 +53,23 @@ class ContactLog:
         steps: int,
         worlds: int,
     ):
-        self._declared, self._rows, self._axes, self._where = declared, rows, axes, where
         K = len(declared.points)
+        places = [(where[key].start, where[key].stop) for key in ("contacts", "touching")]
+        known = None if rows is None else tuple(Rows.of(rows, axes))
+        self._with = *places, tuple(declared), known, np.empty((K, 3)), np.empty(K), tuple(Sums.of(K))
         self.readings = ContactReadings(
-            *(np.empty((steps, worlds, *rest)) for rest in ((K, 3), (K,), (), (), (), ())),
+            *(np.empty((steps, worlds, *rest)) for rest in ((K, 3), (), (), (), ())),
         )
         self.held = Held(
             np.full((steps, worlds, K, 2), np.nan), np.zeros((steps, worlds, K)), np.zeros((steps, worlds), np.bool_)
         )
 
-    def sort(self, first: int, states: Array, contacts: Array) -> None:
+    def sort(self, first: int, poses: Array, sensed: Array) -> None:
         """Sort the contacts (B, W, sensors) of the steps from `first` on, that began at the states (B, W, sensors)."""
-        at = self._declared.touch(*(states[..., self._where[key]] for key in POSE[:2]))
-        sensed, touching = (contacts[..., self._where[key]] for key in ("contacts", "touching"))
-        listed = list_contacts(sensed, at, self._declared)
-        found = sensed[..., 0]
-        self._keep(first, self.readings, read_contacts(listed, found, touching, self._declared))
-        if self._rows is not None:
-            self._keep(first, self.held, held(self._rows, listed, at, self._axes))
-
-    @staticmethod
-    def _keep(first: int, kept: tuple[Any, ...], read: tuple[Any, ...]) -> None:
-        for values, new in zip(kept, read, strict=True):
-            values[first : first + len(new)] = new
+        now = slice(first, first + len(sensed))
+        contacts, touching, declared, rows, *scratch = self._with
+        readings, held = (tuple(values[now] for values in kept) for kept in (self.readings, self.held))
+        sort_contacts(sensed, contacts, touching, poses, declared, rows, *scratch, readings, held)
 
 
 def run_steps(
@@ -114,6 +108,7 @@ def run_steps(
     with first_calls():  # compiled before it is timed
         control.prepare(states, Answers(*(values[0] for values in out)))
         world_wrench(belief.wrench_map, states.orientation, out.wrench[0], wrench_world[0])
+        contacts.sort(0, kept[:0], block[:0])
     kept[0] = sensordata[:, : pose.stop]
     report, first = max(1, steps // 100), 0
     start = perf_counter()

@@ -55,7 +55,7 @@ def stray_words(run: "Run") -> list[str]:
             mujoco.mj_forward(run.model, data)
             at = run.declared.touch(run.position[world, step], run.quaternion[world, step])
             for own, other, contact in forced(run.model, data, body):
-                away = run.declared.shares(np.array(contact.pos)[None], at)[1][0]
+                _, away = run.declared.share(np.array(contact.pos), at)
                 if other != run.truth.support or (away > run.declared.near and not run.declared.landing):
                     found.setdefault((own, other), float(run.time[step]))
         mujoco.mj_step(run.model, data)

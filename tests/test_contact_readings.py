@@ -66,22 +66,22 @@ def test_forces_add_up_to_mujocos(kind: str, tmp_path: Path) -> None:
 
 def declared(points: list[list[float]], near: float = 1e-3) -> Declared:
     at = np.array(points)
-    return Declared(at, np.zeros_like(at), np.eye(3)[:, :2], near, False)
+    return Declared(at, np.zeros_like(at), np.eye(3)[:2], near, False)
 
 
 def test_a_force_amid_an_edge_is_shared_by_the_law_of_the_lever() -> None:
     ends = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
     points = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.1], [2.0, 0.0, 0.0], [2.3, 0.0, 0.0], [1.0, 0.4, 0.0]])
-    share, away = declared(ends.tolist()).shares(points, ends)
-    np.testing.assert_allclose(share, [[1, 0], [0.75, 0.25], [0, 1], [0, 1], [0.5, 0.5]])
-    np.testing.assert_allclose(away, [0.0, 0.0, 0.0, 0.3, 0.4], atol=1e-15)
+    found = [declared(ends.tolist()).share(point, ends) for point in points]
+    np.testing.assert_allclose([share for share, _ in found], [[1, 0], [0.75, 0.25], [0, 1], [0, 1], [0.5, 0.5]])
+    np.testing.assert_allclose([away for _, away in found], [0.0, 0.0, 0.0, 0.3, 0.4], atol=1e-15)
 
 
 def test_of_points_the_nearest_carries_it() -> None:
     corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    share, away = declared(corners.tolist()).shares(np.array([[0.9, 0.0, 5.0], [0.1, 0.8, 0.0]]), corners)
-    np.testing.assert_allclose(share, [[0, 1, 0], [0, 0, 1]])
-    np.testing.assert_allclose(away, [0.1, np.hypot(0.1, 0.2)])
+    found = [declared(corners.tolist()).share(np.array(point), corners) for point in ([0.9, 0.0, 5.0], [0.1, 0.8, 0.0])]
+    np.testing.assert_allclose([share for share, _ in found], [[0, 1, 0], [0, 0, 1]])
+    np.testing.assert_allclose([away for _, away in found], [0.1, np.hypot(0.1, 0.2)])
 
 
 def test_what_leaves_the_table_is_missed(tmp_path: Path) -> None:
