@@ -96,11 +96,12 @@ class LawControl:
         bounds: WrenchBounds,
         external: Array,
     ):
-        self._law, self._desired, self._external = _Law(controller, bounds), desired, external
+        self._law, self._external = _Law(controller, bounds), external[:, None]
+        self._desired = [values[:, None] for values in desired]
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
         j = min(k, len(self._external) - 1)
-        self._law(states, [values[k : k + 1] for values in self._desired], out, self._external[j : j + 1])
+        self._law(states, [values[k] for values in self._desired], out, self._external[j])
 
     def prepare(self, states: States, out: Answers) -> None:
         """Compile."""

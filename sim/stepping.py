@@ -93,9 +93,9 @@ def run_steps(
     stage = int(mujoco.mjtStage.mjSTAGE_VEL)
     batch.forward(stage=stage)
     states = States(*(sensordata[:, where[key]] for key in POSE))
-    pose = slice(where[POSE[0]].start, where[POSE[-1]].stop)
+    pose = sensordata[:, where[POSE[0]].start : where[POSE[-1]].stop]
     nw, n = belief.wrench_map.shape[0], belief.Q_f.shape[0]
-    kept = np.empty((steps + 1, worlds, pose.stop))
+    kept = np.empty((steps + 1, *pose.shape))
     out = Answers(
         np.empty((steps, worlds, nw)),
         np.empty((steps, worlds, nw)),
@@ -109,7 +109,7 @@ def run_steps(
         control.prepare(states, Answers(*(values[0] for values in out)))
         world_wrench(belief.wrench_map, states.orientation, out.wrench[0], wrench_world[0])
         contacts.sort(0, kept[:0], block[:0])
-    kept[0] = sensordata[:, : pose.stop]
+    kept[0] = pose
     report, first = max(1, steps // 100), 0
     start = perf_counter()
     before: Array | None = None
@@ -121,7 +121,7 @@ def run_steps(
         world_wrench(belief.wrench_map, states.orientation, before, wrench_world[k])
         xfrc[:] = wrench_world[k]
         batch.step(stage=stage)
-        kept[k + 1] = sensordata[:, : pose.stop]
+        kept[k + 1] = pose
         block[k - first] = sensordata
         if k + 1 - first == len(block) or k + 1 == steps:
             contacts.sort(first, kept[first : k + 1], block[: k + 1 - first])
