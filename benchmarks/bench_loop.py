@@ -20,7 +20,7 @@ from mujoco.batch import Batch
 from pivoting.models import load
 from pivoting.models.sensors import instrument
 from pivoting.sim import scenario, simulate
-from pivoting.sim.recording import record
+from pivoting.sim.drawing.rerun_recording import record
 from pivoting.sim.run import Run
 
 SCENARIO, RESTART = "pivot-2d", 200

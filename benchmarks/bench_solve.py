@@ -17,11 +17,11 @@ import mujoco
 import numpy as np
 from harness import main, peer_table, timed
 from pivoting.controller import ClarabelWorkspace, WrenchProblem, methods, pyramid_excess, solve
-from pivoting.controller.closed_form import planar_wrench
 from pivoting.controller.conic import CLARABEL, ConicForm, conic_form
-from pivoting.controller.interior_point import contact_wrench
+from pivoting.controller.kernels.interior_point import contact_wrench
+from pivoting.controller.kernels.planar_closed_form import planar_wrench
+from pivoting.controller.kernels.workspace import workspace
 from pivoting.controller.validate import Array
-from pivoting.controller.workspace import workspace
 from rich import print as show
 from rich.markdown import Markdown
 from rich.progress import track

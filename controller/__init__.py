@@ -2,25 +2,23 @@
 
 from pathlib import Path
 
-from pivoting.controller.kernel import CACHE
-from pivoting.controller.stale import drop_stale_kernels
+from pivoting.controller.kernels.kernel_cache import drop_stale_kernels
 
-if CACHE is not None:
-    drop_stale_kernels(CACHE, Path(__file__).parent)  # before any kernel is loaded
+drop_stale_kernels(Path(__file__).parent)  # before any kernel is loaded
 
-from pivoting.controller.bounds import WrenchBounds
 from pivoting.controller.conic import ClarabelWorkspace
 from pivoting.controller.contacts import Contact
-from pivoting.controller.controller import WrenchController
-from pivoting.controller.horizon import BodyState, Horizon
-from pivoting.controller.laws import Body, Law
-from pivoting.controller.plan import Plan, PlanError, Planner
-from pivoting.controller.problem import WrenchProblem, wrench_weight
-from pivoting.controller.receding import RecedingHorizon
+from pivoting.controller.control_laws import Body, Law
+from pivoting.controller.plane_and_space import Motion
+from pivoting.controller.planning.horizon import BodyState, Horizon
+from pivoting.controller.planning.receding_horizon import RecedingHorizon
+from pivoting.controller.planning.sequential_convex import Plan, PlanError, Planner
 from pivoting.controller.references import Constant, MinimumJerk, Reference, Sampled, Sine
 from pivoting.controller.solution import Solution, SolveError
 from pivoting.controller.solvers import methods, pyramid_excess, solve
-from pivoting.controller.space import Motion
+from pivoting.controller.wrench_bounds import WrenchBounds
+from pivoting.controller.wrench_controller import WrenchController
+from pivoting.controller.wrench_problem import WrenchProblem, wrench_weight
 
 __all__ = [
     "Body",

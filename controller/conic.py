@@ -4,9 +4,9 @@ from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
-from pivoting.controller.problem import StandardForm, WrenchProblem
 from pivoting.controller.solution import TOLERANCE, Solution, certified
 from pivoting.controller.validate import Array, fail, number
+from pivoting.controller.wrench_problem import StandardForm, WrenchProblem
 
 CLARABEL: dict[str, Any] = {
     "tol_gap_abs": 1e-11,

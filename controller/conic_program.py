@@ -9,9 +9,9 @@ from time import perf_counter
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from pivoting.controller.block_matrix import Sparse
 from pivoting.controller.conic import CLARABEL, clarabel_solver
-from pivoting.controller.kernel import kernel, subroutine
+from pivoting.controller.kernels.compilation import kernel, subroutine
+from pivoting.controller.planning.block_matrix import Sparse
 from pivoting.controller.validate import Array, fail
 from scipy import sparse
 

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.kernel import subroutine
-from pivoting.controller.space import component, cross, into
+from pivoting.controller.kernels.compilation import subroutine
+from pivoting.controller.plane_and_space import component
+from pivoting.controller.rotations import cross, into
 from pivoting.controller.validate import Array, array, fail, number
 
 

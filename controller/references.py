@@ -6,15 +6,15 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.space import Motion
+from pivoting.controller.plane_and_space import Motion
 from pivoting.controller.validate import array, fail, number
 
 
 class Reference(Protocol):
     """Anything that gives the desired motion at times (N,) [s]: angle, rate and acceleration, each (N,) [rad, s].
 
-    In space (`controller.rotations`) orientation (N, 4), angular velocity and acceleration (N, 3). A single time gives
-    single values. After its `duration` it rests.
+    In space (see `orientation_references`) orientation (N, 4), angular velocity and acceleration (N, 3). A single time
+    gives single values. After its `duration` it rests.
     """
 
     @property

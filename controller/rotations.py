@@ -1,136 +1,169 @@
-"""References in space: where the object's orientation should be, as quaternion, angular velocity and acceleration.
+"""Rotations: quaternions (w, x, y, z), matrices, the exponential and the logarithm (Sola et al. 2018).
 
-Each is a `references.Reference` and gives at times (N,) [s] a `Motion` of quaternions (N, 4) object to world, and
-angular velocities and accelerations (N, 3) in world axes [rad/s, rad/s^2].
+Scalars and loops, no arrays, where kernels call.
 """
 
-import math
-from dataclasses import dataclass
-from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.references import MinimumJerk, Reference
-from pivoting.controller.so3 import exponential
-from pivoting.controller.space import Motion, quaternion_product, rotation_error, rotation_matrix
-from pivoting.controller.validate import Array, array, fail, number, unit_quaternions
+from pivoting.controller.kernels.compilation import kernel, subroutine
+from pivoting.controller.validate import Array
+
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])  # a unit quaternion's inverse, component by component
+_SMALL = 1e-4  # [rad]: below, the series is more accurate than the quotient
 
 
-@dataclass(frozen=True, eq=False)
-class Turn:
-    """Turn about one axis that stays put in the world, by the angle of a planar reference.
+@subroutine
+def cross(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
+    """a x b, as three scalars: no arrays in the inner loops."""
+    return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
 
-    q = exp(angle axis) start: a constant, a minimum-jerk arc, a sine or samples, about a contact's edge or its normal.
 
-    Attributes:
-        angle: planar reference of the angle [rad].
-        axis: (3,) direction in world axes; its length does not matter.
-        start: (4,) orientation at angle 0.
+@subroutine
+def turned(w, x, y, z, a, b, c):  # type: ignore[no-untyped-def]
+    """The vector (a, b, c) turned by a quaternion, which need not be exactly of unit length, as three scalars."""
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    t, u, v = cross(x, y, z, a, b, c)
+    d, e, f = cross(x, y, z, t, u, v)
+    return a + s * (w * t + d), b + s * (w * u + e), c + s * (w * v + f)
+
+
+@subroutine
+def into(R, a0, a1, a2):  # type: ignore[no-untyped-def]
+    """R^T a: a world vector in object axes, as three scalars."""
+    return (
+        R[0, 0] * a0 + R[1, 0] * a1 + R[2, 0] * a2,
+        R[0, 1] * a0 + R[1, 1] * a1 + R[2, 1] * a2,
+        R[0, 2] * a0 + R[1, 2] * a1 + R[2, 2] * a2,
+    )
+
+
+@subroutine
+def fill_product(p, q, out):  # type: ignore[no-untyped-def]
+    """Write the Hamilton product of quaternions (4,) (w, x, y, z) into out, which may be one of them."""
+    w = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3]
+    x = p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2]
+    y = p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1]
+    z = p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0]
+    out[0], out[1], out[2], out[3] = w, x, y, z
+
+
+def components(vectors: ArrayLike) -> list[Any]:
+    """The components of vectors (..., n): n arrays (...), or n floats of one vector, with which Python is faster."""
+    array = np.asarray(vectors, dtype=float)
+    return array.tolist() if array.ndim == 1 else [array[..., i] for i in range(array.shape[-1])]
+
+
+def stacked(values: list[Any]) -> Array:
+    """(..., n) of n components (...)."""
+    return np.array(values) if isinstance(values[0], float) else np.stack(values, axis=-1)
+
+
+def quaternion_product(p: ArrayLike, q: ArrayLike) -> Array:
+    """Hamilton product of (..., 4) quaternions (w, x, y, z), shapes broadcast."""
+    out: list[Any] = [0.0] * 4
+    fill_product(components(p), components(q), out)
+    return stacked(out)
+
+
+@kernel
+def fill_rotation(q, out):  # type: ignore[no-untyped-def]
+    """Write the rotation matrix (3, 3) of quaternion q (4,) into out; q need not be exactly of unit length."""
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    out[0, 0] = 1.0 - s * (y * y + z * z)
+    out[0, 1] = s * (x * y - w * z)
+    out[0, 2] = s * (x * z + w * y)
+    out[1, 0] = s * (x * y + w * z)
+    out[1, 1] = 1.0 - s * (x * x + z * z)
+    out[1, 2] = s * (y * z - w * x)
+    out[2, 0] = s * (x * z - w * y)
+    out[2, 1] = s * (y * z + w * x)
+    out[2, 2] = 1.0 - s * (x * x + y * y)
+
+
+def rotation_matrix(quaternion: Array) -> Array:
+    """(3, 3) rotation matrix of one quaternion (4,)."""
+    out = np.empty((3, 3))
+    fill_rotation(np.ascontiguousarray(quaternion, dtype=float), out)
+    return out
+
+
+@kernel
+def rotation_error(q, q_d):  # type: ignore[no-untyped-def]
+    """Rotation vector [rad], in object axes, that turns orientation q into q_d; its length is at most pi."""
+    # q^-1 q_d, in the object's axes
+    w = q[0] * q_d[0] + q[1] * q_d[1] + q[2] * q_d[2] + q[3] * q_d[3]
+    x = q[0] * q_d[1] - q[1] * q_d[0] - q[2] * q_d[3] + q[3] * q_d[2]
+    y = q[0] * q_d[2] + q[1] * q_d[3] - q[2] * q_d[0] - q[3] * q_d[1]
+    z = q[0] * q_d[3] - q[1] * q_d[2] + q[2] * q_d[1] - q[3] * q_d[0]
+    if w < 0.0:
+        w, x, y, z = -w, -x, -y, -z
+    sine = np.sqrt(x * x + y * y + z * z)
+    scale = 2.0 / w if sine < 1e-9 else 2.0 * np.arctan2(sine, w) / sine
+    return scale * x, scale * y, scale * z
+
+
+@subroutine
+def turn(orientation, vector, out):  # type: ignore[no-untyped-def]
+    """Write the unit quaternion (4,) turned by a rotation vector (3,) [rad] in the object's own axes."""
+    angle = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    scale = 0.5 if angle < 1e-9 else np.sin(0.5 * angle) / angle
+    by = np.cos(0.5 * angle), scale * vector[0], scale * vector[1], scale * vector[2]
+    fill_product(orientation, by, out)
+    length = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2)
+    for i in range(4):
+        out[i] /= length
+
+
+def rotated(orientation: ArrayLike, point: ArrayLike) -> Array:
+    """(..., 3) points turned by unit quaternions (..., 4), shapes broadcast."""
+    return stacked(list(turned(*components(orientation), *components(point))))
+
+
+def exponential(vector: Array) -> Array:
+    """(..., 4) unit quaternions of rotation vectors (..., 3) [rad]."""
+    angle = np.linalg.norm(vector, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(0.5 * angle), 0.5 * np.sinc(angle / (2.0 * np.pi)) * vector], axis=-1)
+
+
+@kernel
+def fill_differences(orientation, out):  # type: ignore[no-untyped-def]
+    """Write the rotation vectors (N, 3) [rad], in object axes, from each of (N+1, 4) orientations to the next."""
+    for i in range(out.shape[0]):
+        out[i, 0], out[i, 1], out[i, 2] = rotation_error(orientation[i], orientation[i + 1])
+
+
+@subroutine
+def fill_hat(x, y, z, out):  # type: ignore[no-untyped-def]
+    """Write the matrix (3, 3) with out u = (x, y, z) x u."""
+    out[0, 0] = out[1, 1] = out[2, 2] = 0.0
+    out[0, 1], out[0, 2], out[1, 2] = -z, y, -x
+    out[1, 0], out[2, 0], out[2, 1] = z, -y, x
+
+
+@subroutine
+def add_product(scale, A, B, out, row, column):  # type: ignore[no-untyped-def]
+    """Add scale A B, (3, 3), to the block of out that begins at this row and column."""
+    for i in range(3):
+        for j in range(3):
+            out[row + i, column + j] += scale * (A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j])
+
+
+@subroutine
+def fill_difference_jacobians(v, end, start):  # type: ignore[no-untyped-def]
+    """Derivatives (3, 3) of v = rotation_error(q, q_d) by small turns of q_d (`end`) and of q (`start`), object axes.
+
+    The inverse of SO(3)'s right Jacobian at v, and minus that of the left.
     """
-
-    angle: Reference
-    axis: Array
-    start: Array
-
-    def __init__(self, angle: Reference, axis: ArrayLike, start: ArrayLike = (1.0, 0.0, 0.0, 0.0)):
-        direction = array("axis", axis, (3,))
-        length = float(np.linalg.norm(direction))
-        if length == 0.0:
-            raise fail("axis", direction, "not zero")
-        object.__setattr__(self, "angle", angle)
-        object.__setattr__(self, "axis", direction / length)
-        object.__setattr__(self, "start", unit_quaternion("start", start))
-
-    @property
-    def duration(self) -> float:
-        """That of the angle [s]; a plain function of time has none, and goes on for ever."""
-        return float(getattr(self.angle, "duration", math.inf))
-
-    def __call__(self, times: ArrayLike) -> Motion:
-        angle, rate, acceleration = (np.asarray(values, dtype=float)[..., None] for values in self.angle(times))
-        turned = quaternion_product(exponential(angle * self.axis), self.start)
-        return Motion(turned, rate * self.axis, acceleration * self.axis)
-
-
-@dataclass(frozen=True, eq=False)
-class Waypoints:
-    """Rest-to-rest turns through orientations, each the shortest and in `seconds`, resting `hold` seconds between.
-
-    Attributes:
-        orientations: (P, 4) quaternions, P >= 2.
-    """
-
-    orientations: Array
-    seconds: float
-    hold: float = 0.0
-
-    def __init__(self, orientations: ArrayLike, seconds: float, hold: float = 0.0):
-        points = array("orientations", orientations, (None, 4))
-        if len(points) < 2:
-            raise fail("orientations", points, "at least two quaternions")
-        points = np.array([unit_quaternion("orientations", point) for point in points])
-        points.flags.writeable = False
-        object.__setattr__(self, "orientations", points)
-        object.__setattr__(self, "seconds", number("seconds", seconds, above=0.0, unit="s"))
-        object.__setattr__(self, "hold", number("hold", hold, at_least=0.0, unit="s"))
-
-    @property
-    def duration(self) -> float:
-        """From the first rest to the end of the last [s]."""
-        return MinimumJerk((0.0,) * len(self.orientations), self.seconds, self.hold).duration
-
-    @cached_property
-    def _turns(self) -> list[Turn]:
-        turns = []
-        for start, end in zip(self.orientations[:-1], self.orientations[1:], strict=True):
-            vector = rotation_matrix(start) @ np.array(rotation_error(start, end))  # world axes
-            angle = float(np.linalg.norm(vector))
-            axis = vector if angle > 0.0 else np.array([0.0, 0.0, 1.0])
-            turns.append(Turn(MinimumJerk((0.0, angle), self.seconds), axis, start))
-        return turns
-
-    def __call__(self, times: ArrayLike) -> Motion:
-        times = np.asarray(times, dtype=float)
-        since = times - self.hold
-        leg = np.clip(since // (self.seconds + self.hold), 0, len(self._turns) - 1).astype(int)
-        parts = [turn(since - i * (self.seconds + self.hold)) for i, turn in enumerate(self._turns)]
-        chosen = [np.stack([np.asarray(part[k]) for part in parts]) for k in range(3)]
-        index = np.broadcast_to(leg[None, ..., None], (1, *times.shape, 1))
-        return Motion(*(np.take_along_axis(values, index, axis=0)[0] for values in chosen))
-
-
-class SampledRotation:
-    """Orientations sampled every `dt` [s], interpolated with continuous acceleration; at rest at the last one after."""
-
-    def __init__(self, orientations: ArrayLike, dt: float):
-        from scipy.spatial.transform import Rotation, RotationSpline
-
-        points = array("orientations", orientations, (None, 4))
-        if len(points) < 2:
-            raise fail("orientations", points, "at least two quaternions")
-        self.orientations = np.array([unit_quaternion("orientations", point) for point in points])
-        self.dt = number("dt", dt, above=0.0, unit="s")
-        rotations = Rotation.from_quat(np.roll(self.orientations, -1, axis=-1))
-        self._curve = RotationSpline(self.dt * np.arange(len(points)), rotations)
-
-    @property
-    def duration(self) -> float:
-        """Time of the last sample [s]."""
-        return self.dt * (len(self.orientations) - 1)
-
-    def __call__(self, times: ArrayLike) -> Motion:
-        times = np.asarray(times, dtype=float)
-        inside = np.clip(times, 0.0, self.duration)
-        moving = ((times >= 0.0) & (times <= self.duration))[..., None]
-        at = self._curve(inside)
-        # the spline's rates are in the object's axes, and the frame's own turning adds nothing: omega x omega = 0
-        rate, acceleration = (at.apply(self._curve(inside, order)) for order in (1, 2))
-        return Motion(
-            np.roll(at.as_quat(), 1, axis=-1), np.where(moving, rate, 0.0), np.where(moving, acceleration, 0.0)
-        )
-
-
-def unit_quaternion(name: str, value: ArrayLike) -> Array:
-    """(4,) of unit length to the last bit; raises unless it was nearly so."""
-    given = unit_quaternions(name, value, (4,))
-    return given / np.linalg.norm(given)
+    x, y, z = v[0], v[1], v[2]
+    angle = np.sqrt(x * x + y * y + z * z)
+    k = 1.0 / 12.0 if angle < _SMALL else (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / (angle * angle)
+    fill_hat(0.5 * x, 0.5 * y, 0.5 * z, end)
+    for i in range(3):
+        for j in range(3):
+            even = k * v[i] * v[j] + (1.0 - k * angle * angle if i == j else 0.0)  # 1 + k v^ v^
+            start[i, j] = end[i, j] - even
+            end[i, j] += even

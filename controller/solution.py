@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from pivoting.controller.problem import WrenchProblem
 from pivoting.controller.validate import Array
+from pivoting.controller.wrench_problem import WrenchProblem
 
 TOLERANCE = 1e-7  # relative KKT residual; the closed form stays below 1e-11, interior points reach about 1e-9
 INSCRIBED = "inscribed"  # optimal for an inscribed pyramid, which is not the problem that was asked

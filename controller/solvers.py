@@ -10,13 +10,13 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from pivoting.controller.closed_form import planar_wrench
 from pivoting.controller.conic import CLARABEL, Answer, clarabel_answer, scaled, split
-from pivoting.controller.interior_point import contact_wrench
-from pivoting.controller.problem import WrenchProblem
+from pivoting.controller.kernels.interior_point import contact_wrench
+from pivoting.controller.kernels.planar_closed_form import planar_wrench
+from pivoting.controller.kernels.workspace import workspace
 from pivoting.controller.solution import INSCRIBED, STATUS, TOLERANCE, Solution, SolveError, certified
 from pivoting.controller.validate import fail, number
-from pivoting.controller.workspace import workspace
+from pivoting.controller.wrench_problem import WrenchProblem
 
 __all__ = ["INSCRIBED", "STATUS", "TOLERANCE", "Solution", "SolveError", "methods", "pyramid_excess", "solve"]
 

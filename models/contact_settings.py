@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.models.body_contacts import forced
-from pivoting.models.reading import initial_data
+from pivoting.models.rigid_body import initial_data
 
 Array = NDArray[np.float64]
 STIFF = 2.1  # time constant of the contacts, in time steps: see settings.xml

@@ -10,11 +10,11 @@ import mujoco
 import numpy as np
 from pivoting.models.contact_settings import STIFF, ContactSettings
 from pivoting.models.frames import Array
-from pivoting.models.lengths import length_unit
-from pivoting.models.naming import ModelError, body_id, body_name
-from pivoting.models.reading import FILE_FRAME, degrees_of_freedom, initial_data
+from pivoting.models.length_unit import length_unit
+from pivoting.models.names import ModelError, body_id, body_name
+from pivoting.models.rigid_body import FILE_FRAME, degrees_of_freedom, initial_data
 from pivoting.models.solver_settings import choose
-from pivoting.models.supports import find_support
+from pivoting.models.support_surfaces import find_support
 
 BODY, TABLE = "block", "table"  # names in the scenes
 WORLD_KEYS = ("mu", "mass", "size", "incline", "gravity", "dt", "timeconst", "impedance", "impratio")
@@ -38,7 +38,7 @@ class Scene:
         mass: of the body [kg], if it is changed.
         scale: by which its size is changed.
         replaced: what of the file gave way to the settings of the shipped scenes, in words: what it was.
-        unit: of the file's lengths [m], see `lengths.length_unit`.
+        unit: of the file's lengths [m], see `length_unit.length_unit`.
         warned: what MuJoCo had to say of the file when it read it.
         read: the model of the file as it is, but for names and what is fused into the body.
     """

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import mujoco
 from pivoting.models.frames import matrix, quaternion
-from pivoting.models.reading import file_frame, read_body
+from pivoting.models.rigid_body import file_frame, read_body
 from pivoting.models.scenes import Scene
 
 SITE = "pivoting/object"  # object axes at the centre of mass
@@ -18,7 +18,7 @@ def instrument(scene: Scene) -> tuple[mujoco.MjModel, dict[str, slice]]:
     Returns:
         The model, and where each reading is in sensordata: position (3) of the CoM, quaternion (4) object to
         world, velocity (3) of the CoM and angular_velocity (3), world axes; contacts (S, 14): each contact with the
-        support, as `sim.contact_readings` takes them apart; touching (4): number of contacts with anything, and their
+        support, as `sim.contact_sensing` takes them apart; touching (4): number of contacts with anything, and their
         net force (3), world axes [N].
     """
     bare = scene.compile()

@@ -96,7 +96,7 @@ def _command(interrupt: _Interrupt) -> Callable[[], int]:
     os.dup2(2, 1)
     try:
         _watch_compilers(interrupt)
-        from pivoting.sim.cli import main as command
+        from pivoting.sim.console.command_line import main as command
 
         sys.stdout.flush()
     finally:
@@ -128,7 +128,7 @@ def _watch_compilers(interrupt: _Interrupt) -> None:
 
 
 def _say_that_it_compiles() -> bool:
-    from pivoting.controller.kernel import CACHE  # whatever compiles has imported it
+    from pivoting.controller.kernels.compilation import CACHE  # whatever compiles has imported it
 
     if CACHE is None:
         where = "in memory, in every run: no folder for a cache can be written to; NUMBA_CACHE_DIR sets one"

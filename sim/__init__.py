@@ -2,17 +2,17 @@
 
 from pathlib import Path
 
-from pivoting.controller.stale import cache_folder, drop_stale_kernels
+from pivoting.controller.kernels.kernel_cache import drop_stale_kernels
 
-if (_cache := cache_folder(Path(__file__).parent)) is not None:  # before any kernel is loaded
-    drop_stale_kernels(_cache, *(Path(__file__).parents[1] / room for room in ("controller", "models", "sim")))
+_here = Path(__file__).parent
+drop_stale_kernels(_here, _here.parent / "controller", _here.parent / "models")  # before any kernel is loaded
 
 from pivoting.sim.attach import Attached, ControlError, attach
-from pivoting.sim.loop import simulate
+from pivoting.sim.judging.verdict import Check, Limits, assert_sticking, assert_tracking
 from pivoting.sim.run import Run
-from pivoting.sim.scenario import Scenario
-from pivoting.sim.shipped import SCENARIOS, own_object, scenario
-from pivoting.sim.verdict import Check, Limits, assert_sticking, assert_tracking
+from pivoting.sim.scenarios.scenario import Scenario
+from pivoting.sim.scenarios.shipped_scenarios import SCENARIOS, own_object, scenario
+from pivoting.sim.simulate import simulate
 
 __all__ = [
     "SCENARIOS",

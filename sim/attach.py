@@ -6,17 +6,18 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pivoting.controller.contacts import Contact
-from pivoting.controller.controller import WrenchController, world_wrench
-from pivoting.controller.laws import Body, Law
+from pivoting.controller.control_laws import Body, Law
+from pivoting.controller.plane_and_space import Motion
+from pivoting.controller.rotations import quaternion_product
 from pivoting.controller.solution import Solution
 from pivoting.controller.solvers import solve
-from pivoting.controller.space import Motion, quaternion_product
 from pivoting.controller.validate import array, fail
+from pivoting.controller.wrench_controller import WrenchController, world_wrench
 from pivoting.models.frames import matrix
-from pivoting.models.friction import read_friction
-from pivoting.models.naming import ModelError
-from pivoting.models.on_body import refuse_off_body
-from pivoting.models.reading import RigidBody, read_body
+from pivoting.models.friction_coefficient import read_friction
+from pivoting.models.names import ModelError
+from pivoting.models.placement.points_on_body import refuse_off_body
+from pivoting.models.rigid_body import RigidBody, read_body
 from pivoting.sim.joint_drag import drag_wrench
 
 Array = NDArray[np.float64]

@@ -2,11 +2,10 @@
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pivoting.controller.controller import WrenchController
-from pivoting.controller.so3 import rotated
-from pivoting.controller.space import CONJUGATE
+from pivoting.controller.rotations import CONJUGATE, rotated
+from pivoting.controller.wrench_controller import WrenchController
 from pivoting.models.frames import matrix
-from pivoting.models.reading import RigidBody
+from pivoting.models.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
 

@@ -7,25 +7,25 @@ from typing import Any
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.controller.plan import Plan
-from pivoting.controller.so3 import rotated
-from pivoting.controller.space import CONJUGATE, Space, quaternion_product, space
+from pivoting.controller.plane_and_space import Space, space
+from pivoting.controller.planning.sequential_convex import Plan
+from pivoting.controller.rotations import CONJUGATE, quaternion_product, rotated
 from pivoting.controller.units import lever
-from pivoting.models.contact_rows import ContactRows
 from pivoting.models.contact_settings import ContactSettings
+from pivoting.models.contact_softness import ContactRows
 from pivoting.models.frames import matrix
-from pivoting.models.naming import geom_name
-from pivoting.models.reading import RigidBody, file_frame, laid_over
-from pivoting.sim.advice import reasons, remedies
+from pivoting.models.names import geom_name
+from pivoting.models.rigid_body import RigidBody, file_frame, laid_over
 from pivoting.sim.attach import Attached
-from pivoting.sim.contact_readings import ContactReadings, Declared
-from pivoting.sim.control import BOUNDED, Event, PlanLog, plan_figures
-from pivoting.sim.fidelity import Held, stepped_point
-from pivoting.sim.monitor import Measures, measure, slip_floor_unknown
-from pivoting.sim.relative import Load
-from pivoting.sim.scenario import Scenario
-from pivoting.sim.strays import stray_words
-from pivoting.sim.verdict import Check, Limits, judge, worst_world
+from pivoting.sim.contact_sensing import ContactReadings, Declared
+from pivoting.sim.judging.advice import reasons, remedies
+from pivoting.sim.judging.measures import Measures, measure, slip_floor_unknown
+from pivoting.sim.judging.predicted_slip import Held, stepped_point
+from pivoting.sim.judging.undeclared_contacts import stray_words
+from pivoting.sim.judging.verdict import Check, Limits, judge, worst_world
+from pivoting.sim.pipeline.control import BOUNDED, Event, PlanLog, plan_figures
+from pivoting.sim.scenarios.relative_values import Load
+from pivoting.sim.scenarios.scenario import Scenario
 
 Array = NDArray[np.float64]
 _CHOSEN = ("contacts", "coupling", "reason")  # of the contact settings, what the model itself does not say

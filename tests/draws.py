@@ -5,13 +5,13 @@ from typing import NamedTuple
 import clarabel
 import numpy as np
 from pivoting.controller import WrenchProblem
-from pivoting.controller.certificate import kkt_residual
-from pivoting.controller.closed_form import balancing_wrench, planar_wrench, reduce
-from pivoting.controller.interior_point import contact_wrench
-from pivoting.controller.kernel import kernel
-from pivoting.controller.polish import polish
-from pivoting.controller.spatial_form import spatial_force
-from pivoting.controller.workspace import opened, workspace
+from pivoting.controller.kernels.compilation import kernel
+from pivoting.controller.kernels.interior_point import contact_wrench
+from pivoting.controller.kernels.newton_polish import polish
+from pivoting.controller.kernels.planar_closed_form import balancing_wrench, planar_wrench, reduce
+from pivoting.controller.kernels.spatial_closed_form import spatial_force
+from pivoting.controller.kernels.workspace import opened, workspace
+from pivoting.controller.kkt_residual import kkt_residual
 from scipy import sparse
 
 SETS = ("scattered", "line", "point", "face", "plane", "edge")

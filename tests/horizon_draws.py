@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 from pivoting.controller import Body, BodyState, Contact, Horizon, Law, WrenchBounds, WrenchController
-from pivoting.controller.horizon_program import Guess
+from pivoting.controller.planning.horizon_program import Guess
 from scipy.spatial.transform import Rotation
 
 from tests.draws import rotation, weight

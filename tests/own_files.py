@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from pivoting.sim import Run, own_object, simulate
-from pivoting.sim.scenario import Scenario
+from pivoting.sim.scenarios.scenario import Scenario
 
 FLOOR = '<geom name="floor" type="plane" size="2 2 .1"/>'
 BOX = '<geom name="g" type="box" size=".05 .04 .06"/>'

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pivoting.sim import Run, simulate
-from pivoting.sim.advice import SLIDES, reasons, remedies, tried
-from pivoting.sim.scenario import Scenario
+from pivoting.sim.judging.advice import SLIDES, reasons, remedies, tried
+from pivoting.sim.scenarios.scenario import Scenario
 
 from tests.own_files import BOX, mjcf, own
 

@@ -8,7 +8,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 ROOMS = {"controller": {"controller"}, "models": {"models"}, "sim": {"controller", "models", "sim"}}
-FILES = [path for room in ROOMS for path in sorted((ROOT / room).glob("*.py"))]
+FILES = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 FILES += sorted((ROOT / "pivoting").glob("*.py"))  # the front of all rooms
 
 
@@ -23,9 +23,9 @@ def imported(path: Path) -> set[str]:
     return names
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}/{path.name}")
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_rooms_import_only_what_they_may(path: Path) -> None:
-    room = path.parent.name
+    room = path.relative_to(ROOT).parts[0]
     own = {name.split(".")[1] for name in imported(path) if name.startswith("pivoting.")} - {"__main__"}
     assert own <= ROOMS.get(room, set(ROOMS))
     if room == "controller":
@@ -33,12 +33,14 @@ def test_rooms_import_only_what_they_may(path: Path) -> None:
     assert not {name.split(".")[0] for name in imported(path)} & set(ROOMS), "bare room names"
 
 
-@pytest.mark.parametrize("path", [*FILES, *sorted((ROOT / "tests").glob("*.py"))], ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "path", [*FILES, *sorted((ROOT / "tests").glob("*.py"))], ids=lambda path: str(path.relative_to(ROOT))
+)
 def test_no_file_is_too_long(path: Path) -> None:
     assert len(path.read_text().splitlines()) <= 400
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}/{path.name}")
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_everything_public_is_documented(path: Path) -> None:
     tree = ast.parse(path.read_text())
     if path.stat().st_size:

@@ -6,9 +6,9 @@ import cvxpy as cp
 import numpy as np
 import pytest
 from pivoting.controller import Body, Contact, Law, Motion, WrenchBounds, WrenchController, solve
-from pivoting.controller.bounded import BREAK, GIVE_UP, BoundedSolver
+from pivoting.controller.bounded_solver import BREAK, GIVE_UP, BoundedSolver
 from pivoting.controller.conic_program import POOR, ClarabelInPlace
-from pivoting.controller.controller import step_worlds
+from pivoting.controller.wrench_controller import step_worlds
 
 G = 10.0
 

@@ -3,9 +3,9 @@
 import mujoco
 import numpy as np
 import pytest
-from pivoting.models import candidates
-from pivoting.models.candidates import Stance, contact_points, stance, support_points
-from pivoting.models.reading import ModelError, matrix
+from pivoting.models.placement import contact_candidates as candidates
+from pivoting.models.placement.contact_candidates import Stance, contact_points, stance, support_points
+from pivoting.models.rigid_body import ModelError, matrix
 
 POINTS = np.random.default_rng(3).normal(size=(14, 3)) * [0.1, 0.15, 0.2]
 GRID = np.array([(x, y, z) for x in range(5) for y in range(5) for z in range(5) if {x, y, z} & {0, 4}]) - 2.0

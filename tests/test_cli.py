@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pivoting.sim.cli import main
+from pivoting.sim.console.command_line import main
 
 KEYS = {
     "scenario", "seed", "worlds", "verdict", "failed_worlds", "slip_max_m", "slip_floor_m", "angle_error_rms_deg",
@@ -141,7 +141,7 @@ def test_a_fault_of_ours_is_not_called_a_wrong_use(monkeypatch: pytest.MonkeyPat
     def broken(console: object) -> None:
         np.zeros(2) + np.zeros(3)
 
-    monkeypatch.setattr("pivoting.sim.report.print_scenarios", broken)
+    monkeypatch.setattr("pivoting.sim.console.tables.print_scenarios", broken)
     monkeypatch.setattr(sys, "argv", ["pivoting", "list"])
     with pytest.raises(ValueError, match="broadcast"):
         main()

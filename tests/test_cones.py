@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pivoting.controller import ClarabelWorkspace, SolveError, WrenchProblem, interior_point, pyramid_excess, solve
-from pivoting.controller.closed_form import balancing_wrench, planar_force, reduce
-from pivoting.controller.interior_point import EXACT
-from pivoting.controller.workspace import workspace
+from pivoting.controller import ClarabelWorkspace, SolveError, WrenchProblem, pyramid_excess, solve
+from pivoting.controller.kernels import interior_point
+from pivoting.controller.kernels.interior_point import EXACT
+from pivoting.controller.kernels.planar_closed_form import balancing_wrench, planar_force, reduce
+from pivoting.controller.kernels.workspace import workspace
 from scipy.linalg import block_diag
 
 from tests.draws import (

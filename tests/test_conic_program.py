@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from pivoting.controller.block_matrix import Sparse
 from pivoting.controller.conic_program import Cones, ConicProgram, kkt_residual
+from pivoting.controller.planning.block_matrix import Sparse
 
 
 def sparse(dense: list[list[float]]) -> Sparse:

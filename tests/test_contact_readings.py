@@ -5,9 +5,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from pivoting.models.reading import initial_data
+from pivoting.models.rigid_body import initial_data
 from pivoting.sim import simulate
-from pivoting.sim.contact_readings import Declared
+from pivoting.sim.contact_sensing import Declared
 
 from tests.own_files import BOX, FLOOR, mjcf, own, pivoted
 

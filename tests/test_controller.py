@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from pivoting.controller import Body, Contact, Law, Motion, WrenchController, solve
-from pivoting.controller.controller import step_worlds, world_wrench
-from pivoting.controller.stale import drop_stale_kernels
+from pivoting.controller.kernels.kernel_cache import drop_stale
+from pivoting.controller.wrench_controller import step_worlds, world_wrench
 from scipy.spatial.transform import Rotation
 
 BLOCK = WrenchController(
@@ -120,16 +120,16 @@ def test_kernels_compiled_of_other_sources_are_dropped(tmp_path: Path) -> None:
     cache.mkdir()
     source, index, code = tmp_path / "law.py", cache / "law.f-1.py311.nbi", cache / "law.f-1.py311.1.nbc"
     source.write_text("mu = 1")
-    assert drop_stale_kernels(cache, tmp_path) == []
+    assert drop_stale(cache, tmp_path) == []
     for path in (index, code):
         path.write_text("")
     os.utime(source, (100.0, 100.0))
-    assert drop_stale_kernels(cache, tmp_path) == []
+    assert drop_stale(cache, tmp_path) == []
     assert index.exists()
     source.write_text("mu = 2")
     os.utime(source, (100.0, 100.0))
-    assert set(drop_stale_kernels(cache, tmp_path)) == {index, code}
-    assert drop_stale_kernels(cache, tmp_path) == []
+    assert set(drop_stale(cache, tmp_path)) == {index, code}
+    assert drop_stale(cache, tmp_path) == []
     assert not list(cache.glob("*.nb*"))
 
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from pivoting.controller import Body, Contact, Law, WrenchController
 from pivoting.sim import Run, own_object, simulate
-from pivoting.sim.control import BOUNDED, FAILED
-from pivoting.sim.film import Film
-from pivoting.sim.identity import digest
-from pivoting.sim.recording import record
+from pivoting.sim.drawing.recorded_world import Film
+from pivoting.sim.drawing.recording_id import digest
+from pivoting.sim.drawing.rerun_recording import record
+from pivoting.sim.pipeline.control import BOUNDED, FAILED
 from scipy.spatial.transform import Rotation
 
 from tests.own_files import mjcf, pivoted

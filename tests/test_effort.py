@@ -19,8 +19,9 @@ from pivoting.controller import (
     WrenchProblem,
     solve,
 )
-from pivoting.controller.bounded import BoundedSolver, BoundedWrench
-from pivoting.sim import control, simulate
+from pivoting.controller.bounded_solver import BoundedSolver, BoundedWrench
+from pivoting.sim import simulate
+from pivoting.sim.pipeline import control
 
 BLOCK = WrenchController(Body(1.0, 1.0 / 6.0), [Contact((-0.5, -0.5), 0.3)], Law.dynamic(), (0.0, -10.0), margin=1 / 6)
 START, END, STEPS, H = np.deg2rad(10.0), np.deg2rad(80.0), 50, 0.02

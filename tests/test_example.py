@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from pivoting.controller import solve
-from pivoting.controller.example import EXAMPLES, compare, quantities
+from pivoting.controller.worked_example import EXAMPLES, compare, quantities
 
 SHIPPED = ("closed-form", "clarabel", "qp:clarabel", "qp:daqp", "qp:piqp", "qp:quadprog")
 

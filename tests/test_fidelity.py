@@ -10,10 +10,10 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from pivoting.models.contact_rows import read_rows
+from pivoting.models.contact_softness import read_rows
 from pivoting.sim import Run, own_object, simulate
-from pivoting.sim.monitor import predicted_slip, slip_floor_unknown
-from pivoting.sim.report import jsonable, print_run
+from pivoting.sim.console.tables import jsonable, print_run
+from pivoting.sim.judging.measures import predicted_slip, slip_floor_unknown
 from rich.console import Console
 
 BOX = '<geom type="box" size=".05 .04 .06" mass="1" {}/>'

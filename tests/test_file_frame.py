@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from pivoting.models import load
-from pivoting.models.reading import file_frame
+from pivoting.models.rigid_body import file_frame
 from pivoting.sim import simulate
 
 from tests.own_files import mjcf, own

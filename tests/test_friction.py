@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pivoting.models import ModelError
-from pivoting.models.friction import contact_friction, read_friction
+from pivoting.models.friction_coefficient import contact_friction, read_friction
 from pivoting.sim import attach, simulate
 
 from tests.own_files import BOX, FLOOR, mjcf, own

@@ -3,12 +3,12 @@
 import mujoco
 import numpy as np
 import pytest
-from pivoting.models.candidates import stance
-from pivoting.models.grip import Grip, grip
-from pivoting.models.hull import read_hull
-from pivoting.models.reading import read_body
-from pivoting.models.search import search
-from pivoting.models.tilt import Arc, Stance
+from pivoting.models.placement.contact_candidates import stance
+from pivoting.models.placement.contact_search import search
+from pivoting.models.placement.convex_hull import read_hull
+from pivoting.models.placement.edge_grip import Grip, grip
+from pivoting.models.placement.tilt_range import Arc, Stance
+from pivoting.models.rigid_body import read_body
 from scipy.spatial.transform import Rotation
 
 ARC = Arc(np.deg2rad(5.0), np.deg2rad(25.0), np.deg2rad(0.1))

@@ -16,8 +16,8 @@ from pivoting.controller import (
     WrenchController,
     solve,
 )
-from pivoting.controller.horizon_program import Guess
-from pivoting.controller.transcription import Path
+from pivoting.controller.planning.equations_of_motion import Path
+from pivoting.controller.planning.horizon_program import Guess
 from scipy.optimize import lsq_linear, minimize
 
 from tests.horizon_draws import INTEGRATORS

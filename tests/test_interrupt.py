@@ -10,7 +10,7 @@ from time import monotonic, sleep
 
 import pytest
 from pivoting.sim import Run
-from pivoting.sim.results import save
+from pivoting.sim.console.output_files import save
 
 from tests.processes import started
 

@@ -1,4 +1,4 @@
-"""What makes compiling slow is not written: see `pivoting.controller.kernel`."""
+"""What makes compiling slow is not written: see `pivoting.controller.kernels.compilation`."""
 
 import ast
 import subprocess
@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numba.core.errors import NumbaError
-from pivoting.controller import kernel as module
-from pivoting.controller.kernel import kernel
+from pivoting.controller.kernels.compilation import kernel
 
 COMPILED = ("kernel", "subroutine")
 BLOCK = """<mujoco><worldbody><geom type="plane" size="2 2 .1"/><body name="block" pos="0 0 .1"><freejoint/>
@@ -43,7 +42,7 @@ def slow(function: ast.FunctionDef) -> list[str]:
     return found
 
 
-ROOMS = [Path(module.__file__).parents[1] / room for room in ("controller", "sim")]
+ROOMS = [Path(__file__).parents[1] / room for room in ("controller", "sim")]
 
 
 @pytest.mark.parametrize(
@@ -65,7 +64,7 @@ def test_a_kernel_that_allocates_is_refused() -> None:
 
 
 LOOPS = """
-from pivoting.controller.controller import step_worlds
+from pivoting.controller.wrench_controller import step_worlds
 from pivoting.sim import own_object, simulate
 simulate("spin-3d")
 simulate(own_object({path!r}, "block", "vertex"))

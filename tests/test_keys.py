@@ -5,8 +5,8 @@ from dataclasses import fields
 import pytest
 from pivoting.models.scenes import WORLD_KEYS
 from pivoting.sim import SCENARIOS, Scenario
-from pivoting.sim.keys import GROUPS, HIDDEN_KEYS, KEYS, OBJECT, SIMULATOR, check, parsed
-from pivoting.sim.report import key_help
+from pivoting.sim.console.tables import key_help
+from pivoting.sim.scenarios.scenario_keys import GROUPS, HIDDEN_KEYS, KEYS, OBJECT, SIMULATOR, check, parsed
 
 OTHERS = {"name", "summary", "scene", "body", "support", "contact", "chosen", "about", "world", "limits", "given"}
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pivoting.models.lengths import length_unit
+from pivoting.models.length_unit import length_unit
 from pivoting.sim import Run, simulate
-from pivoting.sim.report import print_run
+from pivoting.sim.console.tables import print_run
 from rich.console import Console
 
 from tests.own_files import QUICK, own

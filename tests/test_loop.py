@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from pivoting.controller import Motion, WrenchController, WrenchProblem, solve
-from pivoting.controller.controller import Belief
 from pivoting.controller.references import Constant, Sampled
+from pivoting.controller.wrench_controller import Belief
 from pivoting.sim import SCENARIOS, Run, assert_sticking, assert_tracking, own_object, simulate
-from pivoting.sim.control import BOUNDED
+from pivoting.sim.pipeline.control import BOUNDED
 from scipy.spatial.transform import Rotation
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from pivoting.controller.plan import PlanError
-from pivoting.controller.receding import OUTCOMES
+from pivoting.controller.planning.receding_horizon import OUTCOMES
+from pivoting.controller.planning.sequential_convex import PlanError
 from pivoting.sim import Run, assert_sticking, assert_tracking, simulate
-from pivoting.sim.cli import cli
+from pivoting.sim.console.command_line import cli
 
 WEIGHT = 10.0  # of the 1 kg blocks
 

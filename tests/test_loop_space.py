@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pivoting.controller import Motion, solve
-from pivoting.controller.rotations import Turn, Waypoints
+from pivoting.controller.orientation_references import Turn, Waypoints
 from pivoting.models import ModelError
 from pivoting.sim import SCENARIOS, assert_sticking, assert_tracking, attach, own_object, simulate
-from pivoting.sim.monitor import predicted_slip
+from pivoting.sim.judging.measures import predicted_slip
 from scipy.spatial.transform import Rotation
 
 SPATIAL = [name for name in SCENARIOS if name.endswith("3d")]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from pivoting.controller import WrenchProblem, wrench_weight
-from pivoting.controller.example import EXAMPLES
+from pivoting.controller.worked_example import EXAMPLES
 
 J = np.array([[1.0, 0.0], [0.0, 1.0], [0.5, -0.5]])
 GOOD = {"jacobian": J, "required": [0.0, 10.0, 0.0], "mu": 0.3}

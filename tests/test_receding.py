@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from pivoting.controller import Body, BodyState, Contact, Horizon, Law, Plan, Planner, WrenchBounds, WrenchController
-from pivoting.controller.receding import Followed, RecedingHorizon, followed_motion
-from pivoting.controller.so3 import rotated
-from pivoting.controller.space import quaternion_product, space
+from pivoting.controller.plane_and_space import space
+from pivoting.controller.planning.receding_horizon import Followed, RecedingHorizon, followed_motion
+from pivoting.controller.rotations import quaternion_product, rotated
 
 G, H = 10.0, 0.02
 CORNERS = np.array([[0.5, 0.0, -0.5], [-0.5, 0.0, 0.5]])  # that come down next

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 import rerun
-from pivoting.models.reading import matrix
-from pivoting.sim import Run, recording, simulate
-from pivoting.sim.monitor import predicted_slip
-from pivoting.sim.recording import record
+from pivoting.models.rigid_body import matrix
+from pivoting.sim import Run, simulate
+from pivoting.sim.drawing import rerun_recording as recording
+from pivoting.sim.drawing.rerun_recording import record
+from pivoting.sim.judging.measures import predicted_slip
 from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
@@ -346,5 +347,5 @@ def test_in_space(name: str, tmp_path: Path) -> None:
 
 
 def test_importing_does_not_load_rerun() -> None:
-    code = "import sys, pivoting.sim, pivoting.sim.recording; print('rerun' in sys.modules)"
+    code = "import sys, pivoting.sim, pivoting.sim.drawing.rerun_recording; print('rerun' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "False\n"

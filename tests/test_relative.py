@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from pivoting.sim import Run, Scenario, simulate
-from pivoting.sim.relative import Load, absolute, load, multiple
-from pivoting.sim.shipped import SCENARIOS
+from pivoting.sim.scenarios.relative_values import Load, absolute, load, multiple
+from pivoting.sim.scenarios.shipped_scenarios import SCENARIOS
 
 LEVER = np.sqrt(0.5)  # of the block of 1 m, 1 kg, where gravity is 10 m/s^2
 

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pivoting.sim import Run, advice, simulate
-from pivoting.sim.verdict import Limits
+from pivoting.sim import Run, simulate
+from pivoting.sim.judging import advice
+from pivoting.sim.judging.verdict import Limits
 
 from tests.own_files import mjcf, own
 from tests.test_advice import CASES

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 from pivoting.sim import SCENARIOS, Run, own_object, simulate
-from pivoting.sim.recording import RecordingOffError, record
-from pivoting.sim.report import jsonable
-from pivoting.sim.results import save, stem
+from pivoting.sim.console.output_files import save, stem
+from pivoting.sim.console.tables import jsonable
+from pivoting.sim.drawing.rerun_recording import RecordingOffError, record
 from rerun.chunk import RrdReader
 
 BOX = """<mujoco><worldbody><geom type="plane" size="1 1 1"/><body name="a/box" pos="0 0 .1"><freejoint/>

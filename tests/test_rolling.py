@@ -15,16 +15,16 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 from pivoting.controller import Body, Contact, Law, Motion, WrenchController
-from pivoting.controller.controller import world_wrench
-from pivoting.controller.rotations import Turn
+from pivoting.controller.orientation_references import Turn
+from pivoting.controller.wrench_controller import world_wrench
 from pivoting.models import ModelError, load, read_body
-from pivoting.models.faces import faces
-from pivoting.models.hull import read_hull
+from pivoting.models.placement.convex_hull import read_hull
+from pivoting.models.placement.resting_faces import faces
 from pivoting.sim import Run, assert_sticking, assert_tracking, attach, own_object, simulate
-from pivoting.sim.monitor import predicted_slip
-from pivoting.sim.recording import record
-from pivoting.sim.scenario import Scenario
-from pivoting.sim.solids import body_solids
+from pivoting.sim.drawing.rerun_recording import record
+from pivoting.sim.drawing.shapes import body_solids
+from pivoting.sim.judging.measures import predicted_slip
+from pivoting.sim.scenarios.scenario import Scenario
 from scipy.spatial.transform import Rotation
 
 FREE = "<freejoint/>"

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from pivoting.controller.orientation_references import SampledRotation, Turn, Waypoints
 from pivoting.controller.references import Constant, MinimumJerk, Reference, Sine
-from pivoting.controller.rotations import SampledRotation, Turn, Waypoints
 from scipy.spatial.transform import Rotation
 
 TILTED = np.array([0.8, 0.2, -0.4, 0.4])

@@ -5,10 +5,10 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from pivoting.controller.space import space
+from pivoting.controller.plane_and_space import space
 from pivoting.models import ModelError, corner, load, place, read_body, scene_path
 from pivoting.sim import SCENARIOS
-from pivoting.sim.plan import planned
+from pivoting.sim.placement import planned
 
 
 @pytest.mark.parametrize("name", sorted(SCENARIOS))

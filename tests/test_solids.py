@@ -3,8 +3,8 @@
 import mujoco
 import numpy as np
 import pytest
-from pivoting.models.reading import read_body
-from pivoting.sim.solids import SIDES, body_solids, cone
+from pivoting.models.rigid_body import read_body
+from pivoting.sim.drawing.shapes import SIDES, body_solids, cone
 
 TETRAHEDRON = '<asset><mesh name="tetrahedron" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>'
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pivoting.controller.so3 import rotated
+from pivoting.controller.rotations import rotated
 from pivoting.models import ModelError
 from pivoting.sim import assert_sticking, simulate
 

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 from pivoting.models import ModelError
-from pivoting.models.reading import initial_data
-from pivoting.models.supports import find_support, support_surface
+from pivoting.models.rigid_body import initial_data
+from pivoting.models.support_surfaces import find_support, support_surface
 from pivoting.sim import attach, simulate
 from scipy.spatial.transform import Rotation
 

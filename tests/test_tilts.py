@@ -5,10 +5,10 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 import pytest
-from pivoting.models.hull import Hull, read_hull
-from pivoting.models.naming import ModelError
-from pivoting.models.search import search
-from pivoting.models.tilt import LEAST, Arc, Stance
+from pivoting.models.names import ModelError
+from pivoting.models.placement.contact_search import search
+from pivoting.models.placement.convex_hull import Hull, read_hull
+from pivoting.models.placement.tilt_range import LEAST, Arc, Stance
 from scipy.spatial.transform import Rotation
 
 from tests.tilt_oracle import STEP, Array, Shape, edge_range, rim_range, vertex_range

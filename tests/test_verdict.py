@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pivoting.sim import Limits, Run, assert_sticking, assert_tracking
-from pivoting.sim.verdict import judge
+from pivoting.sim.judging.verdict import judge
 
 
 @pytest.mark.parametrize(

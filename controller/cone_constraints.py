@@ -1,0 +1,99 @@
+"""Friction cones and bounds on the wrench as rows of a conic program: half-lines side - linear x >= 0, and cones."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pivoting.controller.friction_pyramid import polygon
+from pivoting.controller.validate import Array
+from pivoting.controller.wrench_bounds import WrenchBounds
+
+Flags = NDArray[np.bool_]
+UNBOUNDED = 1e3  # of the weight: in place of a bound on the change from a wrench that is not known
+
+
+class Limits(NamedTuple):
+    """side - rows x in half-lines (`linear`) and in second-order cones of `orders` (`cone`).
+
+    x is a wrench or a set of contact forces; where `rate`, it is what that differs by from the one before. `rated`:
+    whether there is such a row.
+    """
+
+    linear: Array
+    linear_side: Array
+    linear_rate: Flags
+    cone: Array
+    cone_side: Array
+    cone_rate: Flags
+    orders: tuple[int, ...]
+    rated: bool
+
+    def place(self, sides: Array, first: tuple[int, int], before: Array | None) -> None:
+        """Write the right-hand sides of the first step among a program's, where its rates count from `before`.
+
+        Args:
+            sides: of the program.  first: where its rows in half-lines and those in cones begin.
+            before: (nw,) the wrench before it; None: unknown.
+        """
+        if not self.rated:
+            return
+        for begin, rows, side, rate in (
+            (first[0], self.linear, self.linear_side, self.linear_rate),
+            (first[1], self.cone, self.cone_side, self.cone_rate),
+        ):
+            if before is None:
+                sides[begin : begin + len(side)] = np.where(rate & (side > 0.0), UNBOUNDED, side)
+            else:
+                sides[begin : begin + len(side)] = side + rate * (rows @ before)
+
+
+def friction_limits(mu: Array, floors: Array, dim: int) -> Limits:
+    """The truncated friction cones of K contacts on forces (K d,): |f_t| <= mu f_n, f_n >= floor."""
+    K = len(mu)
+    linear, side, cone = [], [], []
+    for i, (friction, floor) in enumerate(zip(mu, floors, strict=True)):
+        tangents, normal = np.eye(K * dim)[dim * i : dim * (i + 1) - 1], np.eye(K * dim)[dim * (i + 1) - 1]
+        linear.append(-normal)
+        side.append(-floor)
+        if dim == 2:
+            linear += [tangents[0] - friction * normal, -tangents[0] - friction * normal]
+            side += [0.0, 0.0]
+        else:
+            cone += [-friction * normal, *-tangents]
+    rows = np.reshape(cone, (-1, K * dim))
+    still = np.zeros(len(linear), dtype=bool), np.zeros(len(rows), dtype=bool)
+    return Limits(
+        np.array(linear), np.array(side), still[0], rows, np.zeros(len(rows)), still[1], (3,) * (len(rows) // 3), False
+    )
+
+
+def wrench_limits(bounds: WrenchBounds, nw: int, edges: int, unit: Array, h: float) -> Limits:
+    """Bounds on wrenches (nw,) in units (nw,), and on their change over a step of `h` [s].
+
+    With `edges`, two components are kept in the inscribed polygon of so many edges; with 0 in their disc.
+    """
+    linear: list[Array] = []
+    cone: list[Array] = []
+    sides: tuple[list[float], list[float]] = ([], [])
+    rates: tuple[list[bool], list[bool]] = ([], [])
+    orders = []
+    for ball in bounds.balls(nw):
+        kept = np.flatnonzero(np.abs(ball.rows).max(axis=0))
+        scale = float(unit[kept[0]])
+        radius = ball.radius * (h if ball.rate else 1.0) / scale
+        rows = ball.rows * unit / scale
+        if len(rows) == 1 or (len(rows) == 2 and edges):
+            facets = np.array([[1.0], [-1.0]]) if len(rows) == 1 else polygon(edges).facets
+            linear += list(facets @ rows)
+            sides[0].extend([radius] * len(facets))
+            rates[0].extend([ball.rate] * len(facets))
+        else:
+            cone += [np.zeros(nw), *-rows]
+            sides[1].extend([radius] + [0.0] * len(rows))
+            rates[1].extend([ball.rate] * (len(rows) + 1))
+            orders.append(len(rows) + 1)
+    return Limits(
+        np.reshape(linear, (-1, nw)), np.array(sides[0]), np.array(rates[0], dtype=bool),
+        np.reshape(cone, (-1, nw)), np.array(sides[1]), np.array(rates[1], dtype=bool), tuple(orders),
+        bounds.rated,
+    )  # fmt: skip

@@ -1,0 +1,39 @@
+"""How functions are compiled: `kernel`, with an entry from Python, and `subroutine`, which kernels call.
+
+A new user waits for the compiler. Most of its time goes into numba's own Python code, and into callees, which are
+optimised again in every caller. Hence: kernels get their scratch from outside, return no arrays and count no
+references; subroutines have no compiled entry from Python, where they are plain functions; arrays are copied in loops,
+because assigning to a slice also compiles the text of its error message; all arrays are contiguous; and what a problem
+does not need is None, so that its branch is left out.
+"""
+
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from numba import njit
+from numba.extending import register_jitable
+from pivoting.controller.kernels.kernel_cache import cache_folder
+
+CACHE = cache_folder(Path(__file__).parent)
+CACHED = CACHE is not None
+
+_common: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
+
+kernel = njit(cache=CACHED, **_common)
+subroutine = register_jitable(no_cpython_wrapper=True, **_common)
+
+
+@contextmanager
+def first_calls() -> Iterator[None]:
+    """Keep the garbage collector off during calls that may compile: numba makes millions of objects, and searching them
+    takes a tenth of the time."""
+    collected = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collected:
+            gc.enable()

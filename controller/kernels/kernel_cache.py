@@ -1,0 +1,56 @@
+"""Which compiled kernels are still true: numba's cache knows when a function's own file changes, but not its callees'.
+
+Without this, an edit of `kkt_residual.py` would leave the loop compiled in `compiled_step.py` running the old residual.
+"""
+
+import hashlib
+import os
+from contextlib import suppress
+from pathlib import Path
+from types import FunctionType
+
+from numba import njit
+
+
+def cache_folder(room: Path) -> Path | None:
+    """The folder in which numba keeps what it compiles of the files in a room.
+
+    It lies in NUMBA_CACHE_DIR, else beside the sources, else in the user's cache. None where none of them can be
+    written to; numba then raises for each function that asks for a cache.
+    """
+    code = (lambda: None).__code__.replace(co_filename=str(room / "__init__.py"))
+    try:
+        return Path(njit(cache=True)(FunctionType(code, {})).stats.cache_path)
+    except RuntimeError:
+        return None
+
+
+def drop_stale_kernels(room: Path, *others: Path) -> None:
+    """Remove what was compiled of a room, sub-rooms included, from other sources than it and `others` have now."""
+    folders = sorted({path.parent for path in room.rglob("*.py")})
+    for cache in map(cache_folder, folders):
+        if cache is not None:
+            drop_stale(cache, room, *others)
+
+
+def drop_stale(cache: Path, *rooms: Path) -> list[Path]:
+    """Remove the kernels compiled into the folder `cache` of other sources than these rooms have; returns what went.
+
+    Sources are told apart by what they say: dates of installed files need not grow from one version to the next.
+    """
+    digest = hashlib.sha256()
+    for room in rooms:
+        for source in sorted(room.rglob("*.py")):
+            digest.update(str(source.relative_to(room)).encode() + b"\0" + hashlib.sha256(source.read_bytes()).digest())
+    now, kept = digest.hexdigest(), cache / "kernels.sha256"
+    with suppress(FileNotFoundError):
+        if kept.read_text() == now:
+            return []
+    stale = [path for path in cache.glob("*.nb[ic]") if path.is_file()]
+    for path in stale:
+        path.unlink(missing_ok=True)  # another process may be dropping them
+    cache.mkdir(parents=True, exist_ok=True)
+    partial = cache / f"{kept.name}.{os.getpid()}"
+    partial.write_text(now)
+    partial.replace(kept)
+    return stale

@@ -1,0 +1,76 @@
+"""Scratch of the compiled solvers, made once for a problem size: they allocate nothing."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pivoting.controller.kernels.compilation import subroutine
+from pivoting.controller.validate import Array
+
+P, Q, DP, DQ, C = 0, 1, 2, 3, 4  # columns of `Work.floor`
+
+
+class Reduced(NamedTuple):
+    """Scratch for one contact in the plane, n = 2.
+
+    H: (n, n) and h: (n,) of the problem in f alone.  x: (n,).  pull: (2, nw), Q_w w and |Q_w||w|.
+    """
+
+    H: Array
+    h: Array
+    x: Array
+    pull: Array
+
+
+class Work(NamedTuple):
+    """Scratch for all other problems: K contacts, n = K d."""
+
+    axes: tuple[int, ...]  # (0, ..., d - 1): its length makes d a constant when compiled
+    H: Array  # (n, n) and (n,): the problem in f alone
+    h: Array
+    M: Array  # (n, n): the matrix being factored
+    x: Array  # (n,): right-hand side and step
+    z: Array  # (n,): gradient
+    moved: Array  # (n,): forces before a step
+    now: Array  # (n,): iterate
+    g: Array  # (n,): H f - h at the iterate
+    trial_f: Array  # (n,) and (nw,): an answer that may be better
+    trial_w: Array
+    pull: Array  # (2, nw): Q_w w, and |Q_w||w|
+    tangent: Array  # (n, d)
+    start: NDArray[np.int64]  # (K + 1,)
+    piece: NDArray[np.int64]  # (K,) and one more
+    s: Array  # (K, 3): slack of the cones, (mu f_n, f_t, f_o); f_o = 0 in the plane
+    y: Array  # (K, 3): its multiplier
+    bar: Array  # (K, 4): scaling point and eta, see `scaling`
+    lam: Array  # (K, 4): scaled slack, which is also the scaled multiplier, and its determinant
+    u: Array  # (K, 3): scaled step of the slack
+    c: Array  # (K, 3): scaled corrector
+    floor: Array  # (K, 5): slack p = f_n - f_min, its multiplier q, dp, dq, corrector
+
+
+def workspace(nw: int, K: int, dim: int) -> tuple[tuple[Any, ...] | None, tuple[Any, ...] | None]:
+    """Scratch for `planar_wrench`, the values of a `Reduced`, or else for `contact_wrench`: what `opened` opens.
+
+    One contact in the plane needs no more than the reduced problem. None tells the compiler which of the two to leave
+    out, and that is most of its work. Few arrays in plain tuples, because handing over each
+    costs 0.07 us, and in a named one 0.16.
+    """
+    n = K * dim
+    if n == 2:
+        return tuple(Reduced(np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros((2, nw)))), None
+    axes, counts = tuple(range(dim)), np.zeros((2, K + 1), dtype=np.int64)
+    squares, vectors, tangent = np.zeros((2, n, n)), np.zeros((7, n)), np.zeros((n, dim))
+    wrenches, triples, fours, floor = np.zeros((3, nw)), np.zeros((4, K, 3)), np.zeros((2, K, 4)), np.zeros((K, 5))
+    return None, (axes, squares, vectors, wrenches, tangent, counts, triples, fours, floor)
+
+
+@subroutine
+def opened(scratch):  # type: ignore[no-untyped-def]
+    """The `Work` in a scratch of `workspace`."""
+    axes, squares, vectors, wrenches, tangent, counts, triples, fours, floor = scratch
+    return Work(
+        axes, squares[0], vectors[0], squares[1], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5],
+        vectors[6], wrenches[0], wrenches[1:], tangent, counts[0], counts[1], triples[0], triples[1], fours[0],
+        fours[1], triples[2], triples[3], floor,
+    )  # fmt: skip

@@ -1,0 +1,116 @@
+"""The plane and space as one thing: rigid-body quantities live in 3-D and a space says which of them are used.
+
+A planar problem is the spatial one seen through two constant maps: 3 of the 6 wrench components and 2 of the 3
+axes of each contact frame. So every formula (Jacobian, law, error) is written once.
+Planar coordinates are (x right, z up), the angle theta counter-clockwise, that is about -y.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pivoting.controller.kernels.compilation import subroutine
+from pivoting.controller.rotations import CONJUGATE, IDENTITY, quaternion_product, rotation_matrix
+from pivoting.controller.validate import Array, array, fail, unit_quaternions
+
+
+class Motion(NamedTuple):
+    """An orientation and how it changes: a measured state or a point of a reference.
+
+    Plane: angle theta [rad], its rate [rad/s] and acceleration [rad/s^2], as floats.
+    Space: unit quaternion (w, x, y, z) object to world, angular velocity and acceleration (3,) in world axes.
+    """
+
+    orientation: float | ArrayLike
+    velocity: float | ArrayLike = 0.0
+    acceleration: float | ArrayLike = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """Which components of the 3-D rigid-body quantities a problem uses.
+
+    Attributes:
+        dim: 2 (plane) or 3 (space).
+        base: (4,) quaternion of the table's frame (tangent, -, normal) in the world; theta = 0 means that the
+            object's axes are the table's. Identity on a level table. In space only a `Horizon` uses it.
+    """
+
+    dim: int
+    base: Array
+
+    @cached_property
+    def wrench_map(self) -> Array:
+        """(nw, 6): the wrench components used, out of (force, moment) in 3-D; nw = 3 in the plane, 6 in space."""
+        if self.dim == 3:
+            return np.eye(6)
+        out = np.zeros((3, 6))
+        out[0, 0] = out[1, 2] = 1.0
+        out[2, 4] = -1.0
+        return out
+
+    @cached_property
+    def force_map(self) -> Array:
+        """(3, d): the axes of a contact frame (t, o, n) that carry force: (t, n) in the plane."""
+        return np.eye(3) if self.dim == 3 else np.eye(3)[:, [0, 2]]
+
+    def lift(self, vector: Array) -> Array:
+        """A (..., d) vector as (..., 3); a planar (x, z) becomes (x, 0, z)."""
+        return vector @ self.force_map.T
+
+    def lift_inertia(self, inertia: ArrayLike) -> Array:
+        """The inertia tensor (3, 3) [kg m^2] about the CoM, in object axes; a planar scalar turns about y only."""
+        if self.dim == 3:
+            return array("inertia", inertia, (3, 3))
+        if np.ndim(inertia) != 0:
+            raise fail("inertia", inertia, "a number in the plane, about the plane's normal [kg m^2]")
+        return np.diag([0.0, float(np.asarray(inertia)), 0.0])
+
+    def orientation(self, angle: ArrayLike) -> Array:
+        """(..., 4) quaternion object to world of planar angles (...)."""
+        half = 0.5 * np.asarray(angle, dtype=float)
+        zero = np.zeros_like(half)
+        return quaternion_product(self.base, np.stack([np.cos(half), zero, -np.sin(half), zero], axis=-1))
+
+    def angle(self, quaternion: Array) -> Array:
+        """Planar angles (...) [rad] in (-pi, pi] of quaternions (..., 4) object to world."""
+        relative = quaternion_product(self.base * CONJUGATE, quaternion)
+        turned = 2.0 * np.arctan2(-relative[..., 2], relative[..., 0])
+        return np.arctan2(np.sin(turned), np.cos(turned))
+
+    def axial(self, rate: ArrayLike) -> Array:
+        """(..., 3) world vector of planar rates (...) about the plane's normal."""
+        axis = -rotation_matrix(self.base)[:, 1]
+        return np.asarray(rate, dtype=float)[..., None] * axis
+
+    def lift_motion(self, motion: Motion) -> tuple[Array, Array, Array]:
+        """Quaternion (4,), angular velocity (3,) and acceleration (3,) in world axes of a `Motion` of this space."""
+        if self.dim == 2:
+            values = []
+            for name, value in zip(Motion._fields, motion, strict=True):
+                if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf" or not np.isfinite(value):
+                    raise fail(name, value, "a finite number in the plane")
+                values.append(float(value))  # type: ignore[arg-type]
+            return self.orientation(values[0]), self.axial(values[1]), self.axial(values[2])
+        quaternion = unit_quaternions("orientation", motion.orientation, (4,))
+        rates = [np.broadcast_to(np.asarray(rate, dtype=float), (3,)) for rate in motion[1:]]
+        return quaternion, array("velocity", rates[0], (3,)), array("acceleration", rates[1], (3,))
+
+
+def space(dim: int, base: ArrayLike = IDENTITY) -> Space:
+    """The plane (`dim` 2, on a table of frame `base`) or space (`dim` 3)."""
+    return Space(dim, unit_quaternions("base", base, (4,)))
+
+
+def tilt(angle: float) -> Array:
+    """(4,) base of a table that rises to the right by `angle` [rad]."""
+    return np.array([np.cos(0.5 * angle), 0.0, -np.sin(0.5 * angle), 0.0])
+
+
+@subroutine
+def component(wrench_map, row, F0, F1, F2, M0, M1, M2):  # type: ignore[no-untyped-def]
+    """One of the nw components that are used of a wrench (F, M) in 3-D."""
+    m = wrench_map[row]
+    return m[0] * F0 + m[1] * F1 + m[2] * F2 + m[3] * M0 + m[4] * M1 + m[5] * M2

@@ -1,0 +1,231 @@
+"""The horizon's equations of motion, linearised about a path: blocks for each step, in the plane and in space alike.
+
+With y_t the difference of pose t from pose t - 1 (translation in table axes, rotation vector in object axes), all of
+
+    quasi-dynamic  M y_t / h^2 = F(q_t, u_t)                      the notes: every step starts from rest
+    implicit       M (y_t - y_{t-1}) / h^2 = F(q_t, u_t)          the same with the velocity term
+    semi-implicit  M (y_t - y_{t-1}) / h^2 = F(q_{t-1}, u_t)      MuJoCo's Euler
+    forward        M (y_t - y_{t-1}) / h^2 = F(q_{t-2}, u_t)      its first pose is given by the initial velocity
+
+with u = (w, f), F = (R w_F + C f + m g, w_M + p x R'C f - c omega x I omega), are one equation: `order` counts the
+differences on the left, `lag` the poses between the one that is reached and the one at which forces act. Velocities
+are y / h, so that they are no variables; omega is that of y_{t-1}, and c = 0 for order 1.
+"""
+
+from typing import NamedTuple, Self
+
+import numpy as np
+from pivoting.controller.kernels.compilation import kernel, subroutine
+from pivoting.controller.planning.block_matrix import Indices
+from pivoting.controller.rotations import (
+    add_product,
+    cross,
+    fill_difference_jacobians,
+    fill_hat,
+    fill_product,
+    fill_rotation,
+    into,
+    rotation_error,
+    turn,
+)
+from pivoting.controller.units import Units
+from pivoting.controller.validate import Array
+
+INTEGRATORS = {"quasi-dynamic": (1, 0), "implicit": (2, 0), "semi-implicit": (2, 1), "forward": (2, 2)}  # order, lag
+
+
+class Path(NamedTuple):
+    """Poses 0 to N, in table axes, and what came before them.
+
+    position: (N+1, 3) CoM [m].  orientation: (N+1, 4) object axes to table.
+    before: (7,) the pose at which a forward step's forces act first, position and orientation.
+    arriving: (6,) y_0, h times the velocity with which pose 0 is reached.
+    """
+
+    position: Array
+    orientation: Array
+    before: Array
+    arriving: Array
+
+
+class Mechanics(NamedTuple):
+    """What the compiled rows need to know; see `Belief`, but in table axes.
+
+    frames: (K, 3, d) contact axes as columns.  gravity: (3,).  pick, sign: (nw,) the components of 6 that are used.
+    units: in which rows and columns are written.
+    """
+
+    mass: float
+    inertia: Array
+    points: Array
+    pivot: Array
+    frames: Array
+    gravity: Array
+    pick: Indices
+    sign: Array
+    units: Units
+
+
+class Motion(NamedTuple):
+    """towards[0] d_t + towards[1] d_{t-1} + towards[2] d_{t-2} + by_wrench w_t + by_force f_t + constant = 0.
+
+    d: corrections of the poses, (nq,) each; zero for the given pose 0. All in `Units`.
+    constant: (N, nq).  towards: (3, N, nq, nq).  by_wrench: (N, nq, nw).  by_force: (N, nq, K d).
+    """
+
+    constant: Array
+    towards: Array
+    by_wrench: Array
+    by_force: Array
+
+
+class Scratch(NamedTuple):
+    """Scratch for `fill_rows`, `fill_tracking` and `fill_corrected`.
+
+    turns: (8, 3, 3).  poses: (5, 6).  blocks: (4, 6, 6).
+    """
+
+    turns: Array
+    poses: Array
+    blocks: Array
+
+    @classmethod
+    def empty(cls) -> Self:
+        """A new one, not initialised."""
+        return cls(np.empty((8, 3, 3)), np.empty((5, 6)), np.empty((4, 6, 6)))
+
+
+@kernel
+def fill_start(table, to_table, kept, h, ahead, position, orientation, velocity, omega, R, out):  # type: ignore[no-untyped-def]
+    """Write pose 0 of a `Path`, from a state in world axes; `ahead`: one step after it, see `INTEGRATORS`.
+
+    Args:
+        table: (3, 3) its axes as columns; to_table: (4,) its inverse.  kept: (6,) 0 for what cannot move, else 1.
+        R: (3, 3) scratch.
+    """
+    fill_rotation(orientation, R)
+    before, arriving = out.before, out.arriving
+    before[0], before[1], before[2] = into(table, position[0], position[1], position[2])
+    fill_product(to_table, orientation, before[3:])
+    arriving[0], arriving[1], arriving[2] = into(table, velocity[0], velocity[1], velocity[2])
+    arriving[3], arriving[4], arriving[5] = into(R, omega[0], omega[1], omega[2])
+    for i in range(6):
+        arriving[i] *= h * kept[i]
+    for i in range(3):
+        out.position[0, i] = before[i] + (arriving[i] if ahead else 0.0)
+    for i in range(4):
+        out.orientation[0, i] = before[3 + i]
+    if ahead:
+        turn(before[3:], arriving[3:], out.orientation[0])
+
+
+@subroutine
+def fill_motion(body, order, lag, h, path, wrench, force, scratch, out):  # type: ignore[no-untyped-def]
+    """Write the equations of motion, to first order in poses and exactly in wrench and force, about a path.
+
+    Args:
+        body: `Mechanics`.  order, lag: of the integrator.  h: [s].  path: `Path`.
+        wrench, force: (N, nw), (N, K d) [N, N m], with which the forces' dependence on the pose is linearised; zero:
+            it is not.
+        scratch: `Scratch`.  out: `Motion`.
+    """
+    N, K, d = wrench.shape[0], body.points.shape[0], body.frames.shape[2]
+    nw, units = body.pick.shape[0], body.units
+    R, hatted, turning, gyro = scratch.turns[0], scratch.turns[1], scratch.turns[2], scratch.turns[3]
+    end, start, last_end, last_start = scratch.turns[4], scratch.turns[5], scratch.turns[6], scratch.turns[7]
+    y, last, rows, full, spin = (
+        scratch.poses[0], scratch.poses[1], scratch.poses[2], scratch.poses[3], scratch.poses[4]
+    )  # fmt: skip
+    X, gain = scratch.blocks[:3], scratch.blocks[3]
+    unit, light = body.mass / h**2, 1.0 / h**2
+    for i in range(6):
+        last[i] = path.arriving[i]
+    for i in range(3):
+        for j in range(3):
+            last_end[i, j] = last_start[i, j] = 0.0
+    for t in range(N):
+        for i in range(3):
+            y[i] = path.position[t + 1, i] - path.position[t, i]
+        y[3], y[4], y[5] = rotation_error(path.orientation[t], path.orientation[t + 1])
+        fill_difference_jacobians(y[3:], end, start)
+        # inertia
+        for k in range(3):
+            for i in range(6):
+                for j in range(6):
+                    X[k, i, j] = 0.0
+        for i in range(3):
+            X[0, i, i], X[1, i, i] = unit, -unit
+        add_product(light, body.inertia, end, X[0], 3, 3)
+        add_product(light, body.inertia, start, X[1], 3, 3)
+        for i in range(6):
+            full[i] = y[i] - (order - 1) * last[i]
+        for i in range(3):
+            rows[i] = unit * full[i] - body.mass * body.gravity[i]
+            rows[3 + i] = light * (
+                body.inertia[i, 0] * full[3] + body.inertia[i, 1] * full[4] + body.inertia[i, 2] * full[5]
+            )
+        if order == 2:
+            for i in range(3):
+                X[1, i, i] -= unit
+                X[2, i, i] += unit
+                spin[i] = (
+                    body.inertia[i, 0] * last[3] + body.inertia[i, 1] * last[4] + body.inertia[i, 2] * last[5]
+                ) / h
+            c0, c1, c2 = cross(last[3], last[4], last[5], spin[0], spin[1], spin[2])
+            rows[3] += c0 / h
+            rows[4] += c1 / h
+            rows[5] += c2 / h
+            # d(omega x I omega - I omega / h) by y_{t-1}
+            fill_hat(spin[0], spin[1], spin[2], gyro)
+            for i in range(3):
+                for j in range(3):
+                    gyro[i, j] = -gyro[i, j] / h - light * body.inertia[i, j]
+            fill_hat(last[3], last[4], last[5], hatted)
+            add_product(light, hatted, body.inertia, gyro, 0, 0)
+            add_product(1.0, gyro, last_end, X[1], 3, 3)
+            add_product(1.0, gyro, last_start, X[2], 3, 3)
+        # forces, at the pose where they act
+        if lag == 2 and t == 0:
+            fill_rotation(path.before[3:], R)
+        else:
+            fill_rotation(path.orientation[t + 1 - lag], R)
+        for i in range(6):
+            full[i] = 0.0
+        for i in range(nw):
+            full[body.pick[i]] = body.sign[i] * wrench[t, i]
+        fill_hat(full[0], full[1], full[2], hatted)
+        add_product(1.0, R, hatted, X[lag], 0, 3)  # R w turns by -R w^
+        for k in range(K):
+            p0, p1, p2 = body.points[k, 0], body.points[k, 1], body.points[k, 2]
+            g0 = g1 = g2 = 0.0
+            for j in range(d):
+                a0, a1, a2 = body.frames[k, 0, j], body.frames[k, 1, j], body.frames[k, 2, j]
+                b0, b1, b2 = into(R, a0, a1, a2)
+                full[0], full[1], full[2] = a0, a1, a2
+                full[3], full[4], full[5] = cross(p0, p1, p2, b0, b1, b2)
+                for r in range(nw):
+                    out.by_force[t, r, d * k + j] = -body.sign[r] * full[body.pick[r]] * units.force / units.wrench[r]
+                g0 += b0 * force[t, d * k + j]
+                g1 += b1 * force[t, d * k + j]
+                g2 += b2 * force[t, d * k + j]
+            fill_hat(g0, g1, g2, hatted)  # and R'g by (R'g)^
+            fill_hat(p0, p1, p2, turning)
+            add_product(-1.0, turning, hatted, X[lag], 3, 3)
+        for i in range(3):
+            for j in range(3):
+                gain[i, j] = R[i, j]
+                gain[i, 3 + j] = gain[3 + i, j] = 0.0
+                gain[3 + i, 3 + j] = 1.0 if i == j else 0.0
+        for r in range(nw):
+            sign = body.sign[r] / units.wrench[r]
+            out.constant[t, r] = sign * rows[body.pick[r]]
+            for c in range(nw):
+                s = sign * body.sign[c]
+                out.by_wrench[t, r, c] = -s * units.wrench[c] * gain[body.pick[r], body.pick[c]]
+                for k in range(3):
+                    out.towards[k, t, r, c] = s * units.pose[c] * X[k, body.pick[r], body.pick[c]]
+        for i in range(6):
+            last[i] = y[i]
+        for i in range(3):
+            for j in range(3):
+                last_end[i, j], last_start[i, j] = end[i, j], start[i, j]

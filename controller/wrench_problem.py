@@ -1,0 +1,159 @@
+"""The wrench problem: the smallest wrench, with contact forces inside their cones, that gives what is required."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pivoting.controller.friction_pyramid import Polygon, polygon
+from pivoting.controller.kkt_residual import kkt_residual
+from pivoting.controller.validate import Array, array, fail, number, positive_definite
+
+
+class StandardForm(NamedTuple):
+    """min 1/2 x'P x  s.t.  A x = b,  C x <= d  with x = (f, w): the notes' standard QP (erratum 1: f comes first)."""
+
+    P: Array
+    A: Array
+    b: Array
+    C: Array
+    d: Array
+
+
+@dataclass(frozen=True, eq=False)
+class WrenchProblem:
+    """min 1/2 w'Q_w w + 1/2 f'Q_f f  s.t.  J f + w = required, each contact force in its truncated friction cone.
+
+    Balance, quasi-dynamic and dynamic pivoting are this one problem with another right-hand side: `required` is
+    -m g for balance and M a - m g for motion. Plane: nw = 3, d = 2; space: nw = 6, d = 3. Contact forces are ordered
+    (f_t, f_n) or (f_t, f_o, f_n), contact after contact; wrenches are (force, moment about the CoM). The frame is that
+    of J and `required`: the object's, in the notes and in everything built here.
+
+    Always feasible: f = (0, f_min) is in the cones and w = required - J f balances it (erratum 6).
+
+    Attributes:
+        jacobian: (nw, K d) contact Jacobian J_c.
+        required: (nw,) wrench that contact and applied wrench must make together [N, N m].
+        mu: (K,) friction coefficients, > 0.
+        f_min: (K,) floors of the normal forces [N], >= 0.
+        margin: share of each mu kept unused, in [0, 1): the cones are planned with (1 - margin) mu.
+        Q_w: (nw, nw) and Q_f: (K d, K d), symmetric positive definite weights.
+
+    Raises:
+        ValueError: an argument is not finite, has the wrong shape or is out of range; it is named with its value.
+    """
+
+    jacobian: Array
+    required: Array
+    mu: Array
+    f_min: Array
+    margin: float
+    Q_w: Array
+    Q_f: Array
+
+    def __init__(
+        self,
+        jacobian: ArrayLike,
+        required: ArrayLike,
+        mu: ArrayLike,
+        *,
+        f_min: ArrayLike = 0.0,
+        margin: float = 0.0,
+        Q_w: ArrayLike | None = None,
+        Q_f: ArrayLike | None = None,
+    ):
+        J = array("jacobian", jacobian, (None, None))
+        nw, n = J.shape
+        if nw not in (3, 6):
+            raise fail("jacobian", J, "with 3 rows (plane) or 6 rows (space)")
+        dim = 2 if nw == 3 else 3
+        if n == 0 or n % dim:
+            raise fail("jacobian", J, f"with {dim} columns for each contact, at least one contact")
+        K = n // dim
+        mu_all = array("mu", np.broadcast_to(mu, (K,)) if np.ndim(mu) == 0 else mu, (K,))
+        if (mu_all <= 0.0).any():
+            raise fail("mu", mu_all if K > 1 else float(mu_all[0]), "> 0")
+        floors = array("f_min", np.broadcast_to(f_min, (K,)) if np.ndim(f_min) == 0 else f_min, (K,))
+        if (floors < 0.0).any():
+            raise fail("f_min", floors if K > 1 else float(floors[0]), ">= 0 [N]")
+        put = object.__setattr__
+        put(self, "jacobian", J)
+        put(self, "required", array("required", required, (nw,)))
+        put(self, "mu", mu_all)
+        put(self, "f_min", floors)
+        put(self, "margin", number("margin", margin, at_least=0.0, below=1.0))
+        put(self, "Q_w", positive_definite("Q_w", np.eye(nw) if Q_w is None else Q_w, nw))
+        put(self, "Q_f", positive_definite("Q_f", np.eye(n) if Q_f is None else Q_f, n))
+
+    @property
+    def dim(self) -> int:
+        """2 in the plane, 3 in space."""
+        return 2 if self.jacobian.shape[0] == 3 else 3
+
+    @property
+    def contacts(self) -> int:
+        """Number of contacts K."""
+        return self.jacobian.shape[1] // self.dim
+
+    @cached_property
+    def mu_planned(self) -> Array:
+        """(K,) friction that the answer may use: (1 - margin) mu."""
+        return (1.0 - self.margin) * self.mu
+
+    def objective(self, wrench: Array, force: Array) -> float:
+        """1/2 w'Q_w w + 1/2 f'Q_f f; force (K, d) or (K d,)."""
+        f = np.ravel(force)
+        return float(0.5 * (wrench @ self.Q_w @ wrench + f @ self.Q_f @ f))
+
+    def residual(self, wrench: Array, force: Array, *, edges: int = 0) -> float:
+        """Relative KKT residual of an answer, see `kkt_residual.kkt_residual`; nan if it is not finite.
+
+        With `edges` > 0 that of the program whose cones in space are replaced by inscribed pyramids.
+        """
+        w, f = np.array(wrench, dtype=float), np.array(force, dtype=float).ravel()
+        stated = self.jacobian, self.required, self.Q_w, self.Q_f, self.mu_planned, self.f_min
+        shape = self._pyramid(edges) if edges else ()
+        return float(kkt_residual(*stated, w, f, np.empty((2, w.size)), *shape))
+
+    def _pyramid(self, edges: int) -> Polygon:
+        if self.dim != 3:
+            raise fail("edges", edges, "left out in the plane, where the cones are linear")
+        return polygon(edges)
+
+    def standard_form(self, *, edges: int = 0) -> StandardForm:
+        """The problem as the notes' QP in x = (f, w), with rows of C for each contact: floor, edges of the cone.
+
+        In the plane the edges are right and left. In space the cone is replaced by the inscribed pyramid of `edges`
+        faces, whose answers are feasible for the cone and, in general, not optimal.
+
+        Raises:
+            ValueError: in space without `edges`, where the cones are not linear; in the plane with them.
+        """
+        if self.dim != 2 and not edges:
+            raise fail("edges", edges, "at least 3 in space, where cones are not linear (inscribed pyramids)")
+        faces = self._pyramid(edges).facets if edges else np.array([[1.0], [-1.0]])
+        nw, n = self.jacobian.shape
+        K = self.contacts
+        P = np.zeros((n + nw, n + nw))
+        P[:n, :n], P[n:, n:] = self.Q_f, self.Q_w
+        rows, dim = 1 + len(faces), self.dim
+        C = np.zeros((rows * K, n + nw))
+        d = np.zeros(rows * K)
+        for i, (mu, floor) in enumerate(zip(self.mu_planned, self.f_min, strict=True)):
+            normal = dim * (i + 1) - 1
+            C[rows * i, normal] = -1.0
+            d[rows * i] = -floor
+            C[rows * i + 1 : rows * (i + 1), dim * i : normal] = faces
+            C[rows * i + 1 : rows * (i + 1), normal] = -mu
+        return StandardForm(P, np.hstack([self.jacobian, np.eye(nw)]), self.required, C, d)
+
+
+def wrench_weight(dim: int, length: float = 1.0) -> Array:
+    """Q_w = diag(1, ..., 1 / length^2): moments count as forces at a lever of `length` [m].
+
+    length = 1 is the identity of the notes, for which "minimal" depends on the unit of length; the distance from the
+    CoM to the contact is the natural choice. Returns (3, 3) for dim 2, (6, 6) for dim 3.
+    """
+    lever = number("length", length, above=0.0, unit="m")
+    return np.diag([1.0] * dim + [lever**-2] * (1 if dim == 2 else 3))

@@ -1,0 +1,310 @@
+"""The command line: `pivoting example | list | contacts | run`. Exit 0: pass, 1: fail, 2: bad usage in one line."""
+
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from pivoting import __version__
+from pivoting.sim.console.stdout import JsonOutput, console, json_option
+
+if TYPE_CHECKING:
+    from pivoting.sim.scenarios.scenario import Scenario
+
+# What one command alone needs, as rerun and matplotlib, is imported by that.
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, message="pivoting %(version)s")
+def cli() -> None:
+    """The smallest wrench that balances or pivots an object on a frictional contact, proved in MuJoCo."""
+
+
+@cli.command()
+@json_option("Print one JSON object and nothing else.")
+@click.option(
+    "--figure", type=click.Path(path_type=Path), help="Also draw the solution space, a .png, .svg or .pdf file."
+)
+def example(as_json: JsonOutput | None, figure: Path | None) -> int:
+    """Solve the notes' worked example by every method; exit 0 if all printed digits agree."""
+    from pivoting.controller.worked_example import EXAMPLES, compare_all
+    from pivoting.sim.console.tables import jsonable, print_examples
+
+    if figure is not None:
+        _check_figure(figure)
+    results = compare_all()
+    agree = all(digit.agrees for digits, _ in results for digit in digits)
+    if figure is not None:
+        from pivoting.sim.drawing.solution_space_figure import draw_solution_space
+
+        draw_solution_space(results[0][1], figure, f"The notes' worked example, {EXAMPLES[0].summary}")
+    if as_json:
+        rows = [
+            {
+                "example": digits[0].example,
+                "method": digits[0].method,
+                "status": solution.status,
+                "residual": solution.residual,
+                "agrees": all(digit.agrees for digit in digits),
+                "digits": {
+                    digit.quantity: {
+                        "printed": digit.expected,
+                        "value": digit.value,
+                        "agrees": digit.agrees,
+                        "rounds_to_printed": digit.rounds,
+                    }
+                    for digit in digits
+                },
+            }
+            for digits, solution in results
+        ]
+        as_json(jsonable({"agrees": agree, "results": rows}))
+    else:
+        print_examples(console(), results)
+        if figure is not None:
+            click.echo(f"wrote {figure}")
+    return 0 if agree else 1
+
+
+@cli.command("list")
+def list_scenarios() -> int:
+    """The scenarios, a line each."""
+    from pivoting.sim.console.tables import print_scenarios
+
+    print_scenarios(console())
+    return 0
+
+
+class _RunCommand(click.Command):
+    """`run`, whose help ends with the keys of a scenario, from their declaration."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Called by click last of all."""
+        from pivoting.sim.console.tables import key_help
+
+        for title, rows in key_help():
+            with formatter.section(title):
+                formatter.write_dl(rows)
+
+
+@cli.command(cls=_RunCommand)
+@click.argument("scenario")
+@click.option("--worlds", type=click.IntRange(min=1), default=1, show_default=True, help="How many worlds.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the initial errors.")
+@click.option(
+    "--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key, or world.KEY for the world alone."
+)
+@click.option("--limit", "limits", multiple=True, metavar="KEY=VALUE", help="Change a limit of the verdict.")
+@click.option("--model", type=click.Path(path_type=Path), help="An MJCF file of your own, for the scenario pivot.")
+@click.option("--body", help="Name of the body in it that is pivoted, or '#1' of one without a name.")
+@click.option(
+    "--contact", help='What it turns about: vertex, edge, lowest, or "x,y,z" or "x,y,z; x,y,z" in its frame, m.'
+)
+@click.option("--support", help="Name (or '#id') of the geom that it stands on; by default what is under it.")
+@click.option("--as-modelled", is_flag=True, help="Keep the file's contact and solver parameters.")
+@click.option("--open-loop", is_flag=True, help="Plan the whole motion once and apply that, whatever happens.")
+@click.option("--out", type=click.Path(), help="Folder for SCENARIO.rrd, SCENARIO.summary.json and summary.json.")
+@click.option("--record-world", type=click.IntRange(min=0), help="Which world is recorded; by default the worst.")
+@json_option("Print the summary as one JSON object and nothing else.")
+def run(
+    scenario: str,
+    worlds: int,
+    seed: int,
+    settings: tuple[str, ...],
+    limits: tuple[str, ...],
+    open_loop: bool,
+    out: str | None,
+    record_world: int | None,
+    as_json: JsonOutput | None,
+    **own: Any,
+) -> int:
+    """Run SCENARIO in closed loop in MuJoCo; exit 0 if the verdict passes, 1 if it fails.
+
+    The scenario pivot takes an object of your own: --model FILE.xml --body NAME --contact vertex.
+
+    Below, each key with what it may be and its default, unless the scenario has another. 2w is twice the object's
+    weight as it is believed (of a moment at the lever from contact to centre of mass, of a rate per second), 2T twice
+    its natural time, sqrt(lever / gravity).
+    """
+    from pivoting.sim.scenarios.shipped_scenarios import scenario as find
+    from pivoting.sim.simulate import simulate
+
+    changes: dict[str, Any] = _pairs("--set", settings)
+    if "limits" in changes:
+        raise click.BadParameter("--set limits: must be --limit KEY=VALUE")
+    changes["limits"] = _pairs("--limit", limits)
+    case = (_own(**own) if scenario == "pivot" else find(scenario)).change(**changes)
+    given = [key for key, value in own.items() if value is not None and value is not False]
+    if scenario != "pivot" and given:
+        raise click.BadParameter(f"--{given[0].replace('_', '-')}: only the scenario pivot takes it, not {scenario!r}")
+    if record_world is not None and (out is None or record_world >= worlds):
+        allowed = "given with --out" if out is None else f"less than {worlds}, the number of worlds"
+        raise click.BadParameter(f"--record-world {record_world}: must be {allowed}")
+    folder = None if out is None else _make_folder(out)
+    with _progress(f"{scenario}, {worlds} world{'s' * (worlds > 1)}") as report:
+        finished = simulate(case, worlds, seed, progress=report, open_loop=open_loop)
+
+    from pivoting.sim.console.tables import jsonable, print_run
+
+    also: dict[str, Any] = {}
+    if finished.verdict == "fail" and not open_loop:
+        from pivoting.sim.judging.advice import tried
+
+        also["advice"] = tried(finished, simulate)
+    saved = None
+    if folder is not None:  # before it is told: who is told may have gone
+        from pivoting.sim.console.output_files import save
+
+        saved = save(finished, folder, record_world, also=also)
+    if as_json:
+        as_json(jsonable({**finished.summary(), **also}) if saved is None else saved.summary)
+    else:
+        print_run(console(), finished)
+        if also:
+            click.echo(_advised(also["advice"]))
+    for line in () if saved is None else saved.said:
+        click.echo(line)  # under --json on stderr, as all else
+    return 1 if finished.verdict == "fail" else 0
+
+
+@cli.command()
+@click.option("--model", type=click.Path(path_type=Path), required=True, help="An MJCF file of your own.")
+@click.option("--body", required=True, help="Name of the body in it, or '#1' of one without a name.")
+@click.option("--support", help="Name (or #id) of the geom that it stands on; by default what is under it.")
+@click.option("--least", type=click.FloatRange(min=0.1), default=5.0, show_default=True, help="Least range, deg.")
+@json_option("Print them all as one JSON object and nothing else.")
+def contacts(model: Path, body: str, support: str | None, least: float, as_json: JsonOutput | None) -> int:
+    """What a body may be turned about: each contact as `run pivot --contact` takes it, and the angles it allows."""
+    from pivoting.sim.console.contact_table import print_contacts, read_contacts
+
+    with _progress(f"contacts of {body}"):
+        found = read_contacts(model, body, support, least)
+    if as_json:
+        as_json(found)
+    else:
+        print_contacts(console(), found)
+    return 0
+
+
+def _advised(advice: dict[str, Any]) -> str:
+    """What would hold a failing run, or what was tried in vain."""
+    if advice["holds"]:
+        return f"what would hold it: {advice['setting']} ({advice['why']}; tried, it passes)"
+    vain = "; ".join(advice["tried"]) or "nothing fits"
+    more = f", and {len(advice['untried'])} more were not tried" if advice["untried"] else ""
+    return f"nothing was found that would hold it: tried {vain}{more}"
+
+
+def main() -> int:
+    """The exit code: every wrong use ends in one line on stderr and 2; a fault of ours keeps its traceback.
+
+    An interrupt and a reader of stdout that has gone are left to the process: `pivoting.__main__`.
+    """
+    try:  # not cli.main, which makes of an interrupt an empty line and a RuntimeError, and exits where a pipe breaks
+        with cli.make_context("pivoting", sys.argv[1:]) as context:
+            code: int = cli.invoke(context)
+    except click.exceptions.Exit as error:  # of --help and --version
+        return error.exit_code
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        return 2
+    except click.ClickException as error:
+        return _refuse(error.format_message())
+    except BrokenPipeError:
+        raise
+    except _wrong_uses() as error:
+        return _refuse(str(error))
+    except RuntimeError as error:  # no certified answer: the run ends without a verdict
+        click.echo(f"pivoting: {error}", err=True)
+        return 1
+    return code
+
+
+def _wrong_uses() -> tuple[type[Exception], ...]:
+    """What is raised of arguments, models and files that cannot be used; any other ValueError is a fault of ours."""
+    from pivoting.controller.validate import InputError
+    from pivoting.models import ModelError
+
+    return InputError, ModelError, OSError
+
+
+def _refuse(message: str) -> int:
+    click.echo("pivoting: " + " ".join(message.split()), err=True)
+    return 2
+
+
+def _pairs(option: str, pairs: tuple[str, ...]) -> dict[str, str]:
+    out: dict[str, str] = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals or not key or not value:
+            raise click.BadParameter(f"{option} {pair!r}: must be KEY=VALUE")
+        if key in out:
+            raise click.BadParameter(f"{option} {pair!r}: {key} is already given as {out[key]}")
+        out[key] = value
+    return out
+
+
+def _own(
+    model: Path | None, body: str | None, contact: str | None, support: str | None, as_modelled: bool
+) -> "Scenario":
+    """The scenario of an object of one's own."""
+    from pivoting.sim.scenarios.shipped_scenarios import own_object
+
+    for option, value in (("--model", model), ("--body", body)):
+        if value is None:
+            raise click.BadParameter(f"{option} is missing: pivot needs --model FILE.xml --body NAME")
+    assert model is not None
+    assert body is not None
+    where: str | list[list[float]] = "lowest" if contact is None else contact
+    if contact is not None and "," in contact:
+        try:
+            where = [[float(number) for number in point.split(",")] for point in contact.split(";")]
+        except ValueError:
+            raise click.BadParameter(f'--contact {contact!r}: must be "x,y,z" or "x,y,z; x,y,z"') from None
+    return own_object(model, body, where, support=support, chosen=not as_modelled)
+
+
+def _make_folder(name: str) -> Path:
+    """Find out before the work that its results can be kept."""
+    out = Path(name)
+    if not name or (out.exists() and not out.is_dir()):
+        raise click.BadParameter(f"--out {name!r}: must be a folder")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out):
+            pass
+    except OSError as error:
+        raise click.BadParameter(f"--out {name!r}: must be a folder that can be written to ({error})") from None
+    return out
+
+
+def _check_figure(figure: Path) -> None:
+    if figure.suffix not in (".png", ".svg", ".pdf"):
+        raise click.BadParameter(f"--figure {str(figure)!r}: must end in .png, .svg or .pdf")
+    if not figure.parent.is_dir():
+        raise click.BadParameter(f"--figure {str(figure)!r}: its folder does not exist")
+
+
+class _progress:  # noqa: N801
+    """A progress bar on stderr, where that is a terminal; as a context, it gives the function that advances it."""
+
+    def __init__(self, title: str):
+        from rich.console import Console
+        from rich.progress import Progress
+
+        console = Console(stderr=True)
+        self._bar = Progress(console=console, transient=True, disable=not console.is_terminal)
+        self._task = self._bar.add_task(title, total=None)
+
+    def __enter__(self) -> Callable[[int, int], None]:
+        self._bar.start()
+        return self._advance
+
+    def _advance(self, done: int, steps: int) -> None:
+        self._bar.update(self._task, completed=done, total=steps)
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()

@@ -1,0 +1,223 @@
+"""What people read: tables of a run, of the scenarios and of the worked example."""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from pivoting.controller.solution import Solution
+from pivoting.controller.worked_example import EXAMPLES, Digit
+from pivoting.models.length_unit import NAMES
+from pivoting.sim.judging.verdict import Limits
+from pivoting.sim.run import Run
+from pivoting.sim.scenarios.scenario import Scenario
+from pivoting.sim.scenarios.scenario_keys import GROUPS, KEYS
+from pivoting.sim.scenarios.shipped_scenarios import SCENARIOS
+from rich.console import Console
+from rich.table import Table
+
+_EVENTS, _FAILED = 5, 10  # events and failed worlds that people are shown
+_READ = {"object": "read of the object", "contact_settings": "contact"}  # what was read, in the summary and in words
+_SAID = {  # of it otherwise, or not at all
+    "replaced": "in place of the file's",
+    "contacts": "",
+    "coupling": "",
+    "f_min_N": "pressed with",
+    "laid_over_deg": "laid on another side than in the file, over by",
+}
+# with which a name in the summary may end
+_UNITS = {"kg_m2": "kg m^2", **{unit: unit for unit in ("kg", "m", "s", "N", "deg")}}
+
+# name in the summary: (what people read, factor, unit)
+_LINES = {
+    "slip_max_m": ("slip of the contact", 1e3, "mm"),
+    "angle_error_rms_deg": ("angle error, RMS", 1.0, "deg"),
+    "angle_error_max_deg": ("angle error, greatest", 1.0, "deg"),
+    "contact_lost_s": ("time without contact", 1.0, "s"),
+    "undeclared_contact_s": ("time with an undeclared contact", 1.0, "s"),
+    "penetration_rel": ("depth not explained, of the lever", 100.0, "%"),
+    "friction_use_max": ("friction used, |f_t| / (mu f_n)", 1.0, ""),
+    "force_mismatch_rel": ("contact force, predicted against measured", 100.0, "%"),
+    "contacts_missing": ("contacts missing at the end", 1.0, ""),
+    "bounce_m": ("height regained after landing", 1e3, "mm"),
+    "unsolved_steps": ("steps without a certified answer", 1.0, ""),
+}
+
+
+def print_run(console: Console, run: Run) -> None:
+    """The verdict table of a run."""
+    summary = run.summary()
+    console.print(f"[bold]{run.scenario.label}[/]: {run.scenario.summary}", soft_wrap=True, highlight=False)
+    resolved = [
+        f"{key} = {getattr(run.scenario, key)}: {value:.4g} {KEYS[key].unit}"
+        for key, value in summary["resolved"].items()
+    ]
+    read = [f"{name}: {_words(summary[key])}" for key, name in _READ.items() if summary.get(key)]
+    lengths = f"lengths are taken to be in {NAMES[run.unit]}, from the size of gravity; what follows is in m and N"
+    for line in [lengths] * (run.unit != 1.0) + [", ".join(resolved)] * bool(resolved) + read:
+        console.print(line, highlight=False, markup=False, soft_wrap=True, style="dim")
+    table = Table()
+    for heading in ("measured in MuJoCo" + (", worst world" if run.worlds > 1 else ""), "value", "limit", ""):
+        table.add_column(heading, justify="right" if heading in ("value", "limit") else "left")
+    for check in run.checks:
+        words, factor, unit = _LINES[check.name]
+        table.add_row(
+            words,
+            f"{_short(factor * check.value)} {unit}".strip(),
+            f"{_short(factor * check.limit)} {unit}".strip(),
+            "[green]pass[/]" if check.passed else "[red]FAIL[/]",
+        )
+        if check.name == "slip_max_m":
+            floor, unknown = 1e3 * summary["slip_floor_m"], summary["slip_floor_unknown"]
+            told = f"unknown: {unknown}" if unknown else f"{_short(floor)} mm"
+            table.add_row("  of which the simulator's own, predicted", told, "", "", style="dim")
+    console.print(table)
+    failed = run.failed_worlds.size
+    console.print(
+        f"verdict: [bold]{'[green]pass' if not failed else '[red]fail'}[/][/]"
+        f"   worlds: {run.worlds - failed} of {run.worlds} within limits"
+        f"   greatest KKT residual: {summary['residual_max']:.1e}"
+    )
+    if run.worlds > 1:
+        some = ", ".join(str(i) for i in run.failed_worlds[:_FAILED]) + f" and {failed - _FAILED} more" * (
+            failed > _FAILED
+        )
+        console.print(
+            f"the worst world is {run.worst_world}" + f"; those that fail are {some}" * bool(failed), highlight=False
+        )
+    console.print(
+        f"{summary['sim_s']:g} s simulated in {summary['wall_s']:.2f} s; stating, solving and certifying the problem:"
+        f" {summary['solve_us_median']:.1f} us a step (99th percentile {summary['solve_us_p99']:.1f})",
+        soft_wrap=True,
+    )
+    if "plans" in summary:
+        console.print(
+            f"{summary['plans']:.0f} plans, {summary['plans_failed']:.0f} failed;"
+            f" {summary['plan_ms_median']:.2f} ms each (99th percentile {summary['plan_ms_p99']:.2f});"
+            f" greatest KKT residual {_short(summary['plan_residual_max'])};"
+            f" {summary['real_time_factor']:.1f} times real time",
+            soft_wrap=True,
+        )
+    if run.plan is not None:
+        console.print(
+            f"open loop: a plan of {run.plan.horizon.steps} steps ({run.plan.passes} passes, {run.plan.seconds:.2f} s);"
+            f" the object is at most {_short(summary['plan_angle_error_max_deg'])} deg off it",
+            soft_wrap=True,
+        )
+    if summary["bounded_steps"]:
+        told = f"{summary['bounded_steps']} of {run.status.size} steps: the bounds did not allow what was asked for"
+        console.print(told, style="yellow", soft_wrap=True)
+    for warning in run.engine_warnings:
+        console.print(f"MuJoCo: {warning}", style="yellow", highlight=False, soft_wrap=True)
+    for reason in summary["reasons"]:
+        console.print(f"why: {reason}", style="yellow", soft_wrap=True, highlight=False)
+    for event in run.events[:_EVENTS]:
+        console.print(f"world {event.world}, {event.time:.3f} s: {event.what}", style="yellow", soft_wrap=True)
+    if len(run.events) > _EVENTS:
+        console.print(f"and {len(run.events) - _EVENTS} more events, all in summary.json", style="yellow")
+
+
+def key_help() -> list[tuple[str, list[tuple[str, str]]]]:
+    """The keys of `--set` by whose they are, each with what it means and may be and its default; those of `--limit`."""
+    defaults = {each.name: each.default for each in fields(Scenario)}
+    out = []
+    for group in GROUPS:
+        rows = []
+        for name, key in KEYS.items():
+            if key.of == group:
+                default = key.optional if defaults[name] is None else _plain(defaults[name])
+                rows.append((name, f"{key.help} [{key.allowed}; default: {default}]"))
+        out.append((f"Keys of --set, {group}", rows))
+    limits = [(name, f"[>= 0; default: {_plain(value)}]") for name, value in vars(Limits()).items()]
+    return [*out, ("Keys of --limit, what the verdict allows, with the unit in the name", limits)]
+
+
+def _words(read: Mapping[str, Any], between: str = ", ") -> str:
+    """A mapping of the summary as people read it: names, numbers, units; what is empty or zero is left out."""
+    said = []
+    for key, value in read.items():
+        unit = next((unit for unit in _UNITS if key.endswith(f"_{unit}")), "")
+        name = _SAID.get(key, key.removesuffix(f"_{unit}").replace("_", " "))
+        if not name:
+            continue
+        if isinstance(value, Mapping):
+            said.append(f"{name} ({_words(value, '; ')})" if value else "")
+        elif isinstance(value, str) or np.any(value):
+            said.append(f"{name} {_shown(value)} {_UNITS.get(unit, '')}".strip())
+    return between.join(filter(None, said))
+
+
+def _shown(value: Any) -> str:
+    if not isinstance(value, list | tuple):
+        return _plain(value)
+    table = np.array(value, dtype=float) if not any(isinstance(item, str) for item in value) else np.empty(0)
+    table = np.where(np.abs(table) < 1e-7 * np.abs(table).max(initial=0.0), 0.0, table)  # rounding
+    if table.ndim == 2 and table.shape == (3, 3) and not (table - np.diag(np.diag(table))).any():
+        return f"diag{_shown(np.diag(table).tolist())}"
+    items = value if table.ndim != 1 or not table.size else table.tolist()
+    return "(" + ", ".join(_shown(item) for item in items) + ")"
+
+
+def _plain(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def print_scenarios(console: Console) -> None:
+    """A line for each scenario."""
+    width = max(len(name) for name in SCENARIOS)
+    for name, case in SCENARIOS.items():
+        console.print(f"{name:{width}}  {case.summary}", highlight=False, soft_wrap=True)
+    own = "an object of your own, by 20 deg: --model FILE.xml --body NAME --contact vertex"
+    console.print(f"{'pivot':{width}}  {own}", highlight=False, soft_wrap=True)
+
+
+def print_examples(console: Console, results: list[tuple[list[Digit], Solution]]) -> None:
+    """The worked example: what is printed against what is solved, then how far each method is from it."""
+    for example in EXAMPLES:
+        mine = [(digits, solution) for digits, solution in results if digits[0].example == example.name]
+        console.print(f"[bold]{example.name}[/]: {example.summary}", soft_wrap=True)
+        table = Table()
+        for heading in ("", "expected", "solved", "last digit"):
+            table.add_column(heading, justify="left" if not heading else "right")
+        for digit in mine[0][0]:
+            places = len(digit.expected.partition(".")[2]) + 2
+            word = "same" if digit.rounds else "1 apart" if digit.agrees else "[red]DIFFERS[/]"
+            table.add_row(digit.quantity, digit.expected, f"{digit.value:.{places}f}", word)
+        console.print(table)
+    methods = Table()
+    for heading in ("method", *(f"KKT residual, {example.name}" for example in EXAMPLES), "digits"):
+        methods.add_column(heading, justify="left" if heading == "method" else "right")
+    for name in dict.fromkeys(digits[0].method for digits, _ in results):
+        own = [(digits, solution) for digits, solution in results if digits[0].method == name]
+        cells = [
+            f"{solution.residual:.0e}" + ("" if solution.status == "solved" else f" ({solution.status})")
+            for _, solution in own
+        ]
+        agree = all(digit.agrees for digits, _ in own for digit in digits)
+        methods.add_row(name, *cells, "[green]agree[/]" if agree else "[red]DIFFER[/]")
+    console.print(methods)
+    exact = [digit for digit in results[0][0] if digit.agrees and not digit.rounds]
+    for digit in exact:
+        console.print(
+            f"{digit.quantity}: the notes print {digit.expected}; the optimum is {digit.value:.7f}, one unit of the"
+            " last digit away, which is what their solver's tolerance leaves (docs/errata.md).",
+            soft_wrap=True,
+            highlight=False,
+        )
+
+
+def jsonable(value: Any) -> Any:
+    """`value` with NumPy scalars as numbers and what is not finite as null: JSON has no nan."""
+    if isinstance(value, dict):
+        return {key: jsonable(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [jsonable(item) for item in value]
+    if isinstance(value, np.generic):
+        return jsonable(value.item())
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value
+
+
+def _short(value: float) -> str:
+    return f"{value:.3g}" if np.isfinite(value) else "not finite"

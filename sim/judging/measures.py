@@ -1,0 +1,131 @@
+"""The monitor: what a run's raw readings say about sticking, tracking and the contact force."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from pivoting.controller.solution import STATUS
+from pivoting.sim.judging.implicit_step import unseen
+from pivoting.sim.judging.predicted_slip import drift, why_unknown
+
+if TYPE_CHECKING:
+    from pivoting.sim.run import Run
+
+Array = NDArray[np.float64]
+LIFTED = 1e-4  # of the lever: a contact that has risen by more has left the table
+BOUNDED = STATUS.index("bounded")
+
+
+@dataclass(frozen=True, eq=False)
+class Measures:
+    """One value for each world, (W,); angles, lost contact, friction and forces after `settle_s`, all else over all.
+
+    In the unit that the name ends with, whatever the model's unit of length is.
+
+    Attributes:
+        slip_max_m: greatest displacement of a contact along the table from where it started, less what it rolled.
+        slip_floor_m: what the simulator's creep, rotation and penetration terms predict for it, see
+            `predicted_slip.drift`; nan where they cannot, see `slip_floor_unknown`.
+        angle_error_rms_deg, angle_error_max_deg: orientation against the reference.
+        contact_lost_s: time in which nothing pushes on the contacts, or one of them has left the table.
+        undeclared_contact_s: time in which the object touches something anywhere else.
+        penetration_rel: greatest depth beyond what the soft contact explains under the predicted load, in levers.
+        contacts_missing: how many fewer contacts there are at the end than the scenario asks for.
+        bounce_m: height that the landed face regains after the first moment with all these contacts.
+        friction_use_max: measured |f_t| / (mu f_n) with the world's mu; nan if there never was a push.
+        force_mismatch_rel: RMS of measured minus predicted contact force over RMS of the predicted.
+        residual_max: greatest KKT residual; inf where a step had no answer.
+        unsolved_steps: steps without an answer within tolerance; within bounds is one.
+    """
+
+    slip_max_m: Array
+    slip_floor_m: Array
+    angle_error_rms_deg: Array
+    angle_error_max_deg: Array
+    contact_lost_s: Array
+    undeclared_contact_s: Array
+    penetration_rel: Array
+    contacts_missing: Array
+    bounce_m: Array
+    friction_use_max: Array
+    force_mismatch_rel: Array
+    residual_max: Array
+    unsolved_steps: Array
+
+
+@np.errstate(invalid="ignore", divide="ignore", over="ignore")  # a world that diverges fails, without noise
+def measure(run: "Run") -> Measures:
+    """Measure a run. Not-a-number anywhere in a world's readings ends up in its measures, and so in the verdict."""
+    settled = run.time >= run.scenario.limits.settle_s - 1e-12
+    error = np.rad2deg(run.angle_error[:, settled])
+    steps = settled[:-1]
+    # a body that has landed shares the load among contacts that the controller does not count
+    counted = steps & ~(run.landed.any(axis=0) if run.scenario.limits.contacts_end else np.zeros_like(steps))
+    measured, predicted = run.force_measured[:, counted], run.force[:, counted]
+    use = run.friction_use[:, steps]
+    pushed = ~np.isnan(use)
+    height = run.corner[..., 2] - np.maximum(run.corner[:, :1, :, 2], 0.0)  # one with a margin is held above the table
+    lost = ~pushed.any(axis=2) | (height > LIFTED * run.size)[:, 1:][:, steps].any(axis=2)
+    mismatch = _rms(np.linalg.norm(measured - predicted, axis=-1)) / _rms(np.linalg.norm(predicted, axis=-1))
+    ever = pushed.any(axis=(1, 2))
+    return Measures(
+        slip_max_m=run.unit * np.linalg.norm(run.slip, axis=-1).max(axis=(1, 2)),
+        slip_floor_m=run.unit * np.linalg.norm(predicted_slip(run), axis=-1).max(axis=(1, 2)),
+        angle_error_rms_deg=_rms(error),
+        angle_error_max_deg=np.abs(error).max(axis=1),
+        contact_lost_s=np.count_nonzero(lost, axis=1) * run.dt,
+        undeclared_contact_s=np.count_nonzero(run.contacts.strays > 0.0, axis=1) * run.dt,
+        penetration_rel=_penetration(run) / run.size,
+        contacts_missing=np.maximum(run.scenario.limits.contacts_end - run.contacts_found[:, -1], 0.0),
+        bounce_m=run.unit * _bounce(run),
+        friction_use_max=np.where(ever, np.where(pushed, use, 0.0).max(axis=(1, 2)), np.nan),
+        force_mismatch_rel=mismatch,
+        residual_max=np.where(np.isfinite(run.residual), run.residual, np.inf).max(axis=1),
+        unsolved_steps=np.count_nonzero((run.status != 0) & (run.status != BOUNDED), axis=1).astype(float),
+    )
+
+
+def _penetration(run: "Run") -> Array:
+    """(W,) greatest depth [m] beyond that at which the soft contact balances the predicted load."""
+    rows = run.contact_rows
+    load = run.force[..., -1].sum(axis=-1)
+    explained = 0.0 if rows is None else rows.depth(np.nan_to_num(load) / rows.points)
+    return np.maximum(run.contacts.depth - explained, 0.0).max(axis=1)
+
+
+def _bounce(run: "Run") -> Array:
+    """(W,) greatest clearance [m] of the landed face; 0 where nothing is to land, or has landed."""
+    if not run.scenario.limits.contacts_end:
+        return np.zeros(run.worlds)
+    after = np.logical_or.accumulate(run.landed, axis=1)
+    return np.where(after, run.clearance[:, 1:], 0.0).max(axis=1)
+
+
+def predicted_slip(run: "Run") -> Array:
+    """(W, N+1, K, 2) the displacement [m] of each point along the table that MuJoCo's contact model itself predicts.
+
+    Not-a-number from where it cannot.
+    """
+    if run.contact_rows is None:
+        return np.full(run.slip.shape, np.nan)
+    point, omega = run.stepped[..., None, :], run.angular_velocity @ run.table_axes
+    turning, touching = run.turning - point, run.lever - point
+    return drift(run.contact_rows, run.held, turning, touching, run.stepped_velocity, omega, unseen(run), _settle(run))
+
+
+def slip_floor_unknown(run: "Run") -> str:
+    """Why that cannot be predicted, in the first world where it cannot; "" where it can in all."""
+    found = why_unknown(run.contact_rows, run.held, run.time, _settle(run))
+    told = [f"{why}{f' in world {world}' * (run.worlds > 1)}" for world, why in enumerate(found) if why]
+    return told[0] if told else ""
+
+
+def _settle(run: "Run") -> int:
+    """Steps that the start may take."""
+    return int(np.count_nonzero(run.time[:-1] < run.scenario.limits.settle_s - 1e-12))
+
+
+def _rms(values: Array) -> Array:
+    """Over steps, and over contacts where there are any."""
+    return np.sqrt(np.mean(values**2, axis=tuple(range(1, values.ndim))))

@@ -1,0 +1,201 @@
+"""The verdict: explicit thresholds on what was measured, and assertions on them for anyone's tests."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pivoting.controller.validate import fail, number
+
+if TYPE_CHECKING:
+    from pivoting.sim.judging.measures import Measures
+    from pivoting.sim.run import Run
+
+FALL = 0.01  # [s]
+TRACKING = ("angle_error_rms_deg", "angle_error_max_deg")  # checks of the angle; the others are of contact and force
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Thresholds of a verdict; angles, lost contact, friction and forces count after `settle_s`, all else always.
+
+    Attributes:
+        slip_m: displacement of the material corner along the table [m]; None, whatever the unit of length: `slip_rel`
+            levers from the contact to the centre of mass, but no more than the object would fall in 10 ms (0.49 mm).
+        angle_rms_deg, angle_max_deg: error of theta.
+        contact_lost_s: time in which nothing pushes on the contacts, or one of them has left the table.
+        undeclared_contact_s: time in which something else than these contacts touches the object.
+        penetration_rel: depth of the contact beyond what the soft contact explains, in levers.
+        contacts_end: contacts with the support that there have to be at the end; 0: not asked.
+        bounce_m: height that the landed face may regain, where that is asked [m].
+        force_mismatch_rel: RMS of (measured - predicted contact force) over RMS of the predicted.
+        friction_use: |f_t| / (mu f_n), measured, with the world's mu; at 1 the contact slides.
+        settle_s: what the start may take [s].
+    """
+
+    slip_m: float | None = 1e-4
+    slip_rel: float = 0.01
+    angle_rms_deg: float = 0.1
+    angle_max_deg: float = 0.2
+    contact_lost_s: float = 0.0
+    undeclared_contact_s: float = 0.0
+    penetration_rel: float = 0.01
+    contacts_end: int = 0
+    bounce_m: float = 1e-5
+    force_mismatch_rel: float = 0.05
+    friction_use: float = 0.999
+    settle_s: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if name != "slip_m" or value is not None:
+                number(f"limits.{name}", value, at_least=0.0)
+        if not float(self.contacts_end).is_integer():
+            raise fail("limits.contacts_end", self.contacts_end, "a whole number")
+        object.__setattr__(self, "contacts_end", int(self.contacts_end))
+
+    def for_object(self, lever: float, gravity: float) -> "Limits":
+        """These limits for an object with a lever [m] under gravity [m/s^2]: that on its slip is a length."""
+        fall = 0.5 * gravity * FALL**2 if gravity > 0.0 else np.inf
+        return self if self.slip_m is not None else replace(self, slip_m=min(self.slip_rel * lever, fall))
+
+    def change(self, limits: "Limits | Mapping[str, float | str]") -> "Limits":
+        """These with other values, of a mapping from text if need be; or the limits that are given.
+
+        Raises:
+            ValueError: there is no such limit, or a value is not a number >= 0; it is named.
+        """
+        if isinstance(limits, Limits):
+            return limits
+        if not isinstance(limits, Mapping):
+            raise fail("limits", limits, 'Limits, or a mapping such as {"slip_m": 2e-3}')
+        new: dict[str, Any] = {}
+        for name, value in limits.items():
+            if name not in vars(self):
+                raise fail(f"limits.{name}", value, "a known limit: " + ", ".join(vars(self)))
+            try:
+                new[name] = float(value) if isinstance(value, str) else value
+            except ValueError:
+                raise fail(f"limits.{name}", value, "a number") from None
+        return replace(self, **new)
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """One line of the verdict: the worst world's value against its limit.
+
+    Attributes:
+        name: key of the run's summary.  value, limit: in the unit that the name ends with.
+        failed: (W,) which worlds are over the limit, or not finite.
+    """
+
+    name: str
+    value: float
+    limit: float
+    failed: NDArray[np.bool_]
+
+    @property
+    def passed(self) -> bool:
+        """No world failed it."""
+        return not self.failed.any()
+
+
+def judge(measures: "Measures", limits: Limits) -> tuple[Check, ...]:
+    """Every check of a run; a value that is not finite fails."""
+    assert limits.slip_m is not None, "limits are for a lever"
+    pairs = {
+        "slip_max_m": (measures.slip_max_m, limits.slip_m),
+        "angle_error_rms_deg": (measures.angle_error_rms_deg, limits.angle_rms_deg),
+        "angle_error_max_deg": (measures.angle_error_max_deg, limits.angle_max_deg),
+        "contact_lost_s": (measures.contact_lost_s, limits.contact_lost_s),
+        "undeclared_contact_s": (measures.undeclared_contact_s, limits.undeclared_contact_s),
+        "penetration_rel": (measures.penetration_rel, limits.penetration_rel),
+        "friction_use_max": (measures.friction_use_max, limits.friction_use),
+        "force_mismatch_rel": (measures.force_mismatch_rel, limits.force_mismatch_rel),
+        "unsolved_steps": (measures.unsolved_steps, 0.0),
+    }
+    if limits.contacts_end:
+        pairs |= {
+            "contacts_missing": (measures.contacts_missing, 0.0),
+            "bounce_m": (measures.bounce_m, limits.bounce_m),
+        }
+    return tuple(Check(name, float(np.max(value)), limit, ~(value <= limit)) for name, (value, limit) in pairs.items())
+
+
+def worst_world(run: "Run") -> int:
+    """The world in which a value is the greatest multiple of its limit; what is not finite is beyond any."""
+    ratios = np.zeros(run.worlds)
+    for check in run.checks:
+        values = np.asarray(getattr(run.measures, check.name), dtype=float)
+        over = np.where(np.isfinite(values), values, np.inf)
+        over = over / check.limit if check.limit > 0.0 else np.where(over > 0.0, np.inf, 0.0)
+        ratios = np.maximum(ratios, over)
+    return int(np.argmax(ratios))
+
+
+def assert_sticking(
+    run: "Run",
+    *,
+    slip_m: float | None = None,
+    contact_lost_s: float | None = None,
+    undeclared_contact_s: float | None = None,
+    penetration_rel: float | None = None,
+    friction_use: float | None = None,
+    force_mismatch_rel: float | None = None,
+    bounce_m: float | None = None,
+) -> None:
+    """Fail unless the contact stuck in every world, nothing else touched, and the force was as predicted.
+
+    Args:
+        run: of `simulate`.
+        slip_m, ...: limits in place of the scenario's own, see `Limits`.
+
+    Raises:
+        AssertionError: it names the check, the worst world, its value, the limit, and the slip that is the simulator's
+            own.
+        ValueError: a limit is not a number >= 0.
+    """
+    given = {
+        "slip_m": slip_m,
+        "contact_lost_s": contact_lost_s,
+        "undeclared_contact_s": undeclared_contact_s,
+        "penetration_rel": penetration_rel,
+        "friction_use": friction_use,
+        "force_mismatch_rel": force_mismatch_rel,
+        "bounce_m": bounce_m,
+    }
+    floor = float(np.max(run.measures.slip_floor_m))
+    _assert_below(
+        run,
+        given,
+        lambda name: name not in (*TRACKING, "unsolved_steps"),
+        f" (the simulator itself: slip_floor_m = {floor:.3g})",
+    )
+
+
+def assert_tracking(run: "Run", *, rms_deg: float | None = None, max_deg: float | None = None) -> None:
+    """Fail unless theta follows the reference in every world.
+
+    Args:
+        run: of `simulate`.
+        rms_deg, max_deg: limits [deg] in place of the scenario's own.
+
+    Raises:
+        AssertionError: it names the check, the worst world, its value and the limit.
+        ValueError: a limit is not a number >= 0.
+    """
+    _assert_below(run, {"angle_rms_deg": rms_deg, "angle_max_deg": max_deg}, TRACKING.__contains__, "")
+
+
+def _assert_below(run: "Run", given: Mapping[str, float | None], asked: Callable[[str], bool], context: str) -> None:
+    """Of the checks whose name is asked for, within the limits that are given or else the run's own."""
+    limits = run.limits.change({name: value for name, value in given.items() if value is not None})
+    wrong = []
+    for check in judge(run.measures, limits):
+        if asked(check.name) and not check.passed:
+            values = np.atleast_1d(getattr(run.measures, check.name))
+            world = int(np.argmax(np.where(np.isfinite(values), values, np.inf)))
+            wrong.append(f"{check.name} = {values[world]:.4g} > {check.limit:.4g} in world {world}")
+    if wrong:
+        raise AssertionError(f"{run.scenario.name}: " + "; ".join(wrong) + context)

@@ -1,0 +1,1 @@
+"""One step of the closed loop: sense, observe, control, actuate, plant; and the log of each."""
