@@ -111,7 +111,7 @@ def taped(run: "Run") -> Tape:
         qvel=run.start[1][0],
         wrench=run.wrench_world[0],
         held=run.truth.com + run.points,
-        radius=run.radius,
+        radius=run.world.radius,
         table=table,
         desired=run.desired[0],
         height=float(run.truth.origin @ table[:, 2]),

@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,7 @@ class Scene:
         unit: of the file's lengths [m], see `length_unit.length_unit`.
         warned: what MuJoCo had to say of the file when it read it.
         read: the model of the file as it is, but for names and what is fused into the body.
+        unchanged: whether `spec` says the same as `read`.
     """
 
     spec: mujoco.MjSpec
@@ -53,9 +55,15 @@ class Scene:
     unit: float
     warned: tuple[str, ...]
     read: mujoco.MjModel
+    unchanged: bool = False
+
+    @cached_property
+    def compiled(self) -> mujoco.MjModel:
+        """The model, compiled once."""
+        return self.read if self.unchanged else self.compile()
 
     def compile(self) -> mujoco.MjModel:
-        """The model.
+        """A model of one's own.
 
         Raises:
             ModelError: MuJoCo does not compile it, for the reason that it gives.
@@ -84,6 +92,8 @@ class Scene:
         Raises:
             ModelError: the file has nothing that a key could change.
         """
+        if self.unchanged and not changes:
+            return self
         spec, wanted = self.spec.copy(), dict(changes)
         geoms, table, parts = self._parts(spec)
         ours = bool(self.replaced) or self.path.parent == Path(__file__).parent
@@ -110,7 +120,7 @@ class Scene:
                 part.solimp[:2] = wanted["impedance"]
         if spec.option.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
             _override(spec.option, wanted)
-        return replace(self, spec=spec, mass=wanted.get("mass", self.mass), scale=self.scale * scale)
+        return replace(self, unchanged=False, spec=spec, mass=wanted.get("mass", self.mass), scale=self.scale * scale)
 
     def with_contacts(self, settings: ContactSettings) -> "Scene":
         """This scene with these contact parameters of the body and its support."""
@@ -120,7 +130,7 @@ class Scene:
             part.solref[:2], part.solimp[:2] = solref, settings.impedance
         if spec.option.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
             spec.option.o_solref[:2], spec.option.o_solimp[:2] = solref, settings.impedance
-        return replace(self, spec=spec)
+        return replace(self, spec=spec, unchanged=False)
 
     def _parts(self, spec: mujoco.MjSpec) -> tuple[list[Any], Any, list[Any]]:
         """Of a spec of this scene: the body's geoms, the support, and all that has parameters of their contacts."""
@@ -175,7 +185,17 @@ def load(
             spec, mujoco.MjSpec.from_file(str(scene_path("balance-2d"))), [*geoms, table, *_pairs(spec, geoms)]
         )
     scene = Scene(
-        spec, path, name, table.name, None, 1.0, tuple(replaced.items()), length_unit(raw.opt.gravity), warned, read
+        spec,
+        path,
+        name,
+        table.name,
+        None,
+        1.0,
+        tuple(replaced.items()),
+        length_unit(raw.opt.gravity),
+        warned,
+        read,
+        unchanged=not chosen,
     )
     return scene.changed(changes or {})
 

@@ -21,7 +21,7 @@ def instrument(scene: Scene) -> tuple[mujoco.MjModel, dict[str, slice]]:
         support, as `sim.contact_sensing` takes them apart; touching (4): number of contacts with anything, and their
         net force (3), world axes [N].
     """
-    bare = scene.compile()
+    bare = scene.compiled
     body = read_body(bare, scene.body, scene.support)
     origin, axes = file_frame(bare, body.index)
     spec = scene.spec.copy()

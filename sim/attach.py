@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pivoting.controller.contacts import Contact
 from pivoting.controller.control_laws import Body, Law
+from pivoting.controller.kernels.compiled_step import world_wrench
 from pivoting.controller.plane_and_space import Motion
 from pivoting.controller.rotations import quaternion_product
 from pivoting.controller.solution import Solution
 from pivoting.controller.solvers import solve
 from pivoting.controller.validate import array, fail
-from pivoting.controller.wrench_controller import WrenchController, world_wrench
+from pivoting.controller.wrench_controller import WrenchController
 from pivoting.models.frames import matrix
 from pivoting.models.friction_coefficient import read_friction
 from pivoting.models.names import ModelError

@@ -27,8 +27,8 @@ ANY = Load(1e-6, 1.0, 1e-6)  # so small that nothing that is relative to it is t
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
-    """A scenario on a model.
+class Placement:
+    """Where an object is placed and about what it turns.
 
     Attributes:
         body: as the model has it.
@@ -55,14 +55,19 @@ class Plan:
     unit: float = 1.0
 
     @property
+    def lever(self) -> float:
+        """From where the first contact touches to the CoM [m]."""
+        return float(np.linalg.norm(self.body.com - self.contacts[0]) + self.radius[0])
+
+    @property
     def load(self) -> Load:
         """What values of the scenario may be relative to, in N, m and s."""
         points = np.array([self.body.point(contact) for contact in self.contacts])
         return load(self.body.mass, self.unit * self.body.gravity, self.unit * points, self.unit * self.radius)
 
 
-def planned(case: Scenario, model: mujoco.MjModel, unit: float = 1.0) -> Plan:
-    """The scenario's plan on its compiled model, whose lengths are in `unit` [m], as the controller believes it.
+def placed(case: Scenario, model: mujoco.MjModel, unit: float = 1.0) -> Placement:
+    """The scenario's object placed in its compiled model, whose lengths are in `unit` [m].
 
     Raises:
         ModelError: the model cannot be served, or the object cannot be pivoted on that contact; with the reason.
@@ -93,28 +98,28 @@ def _refuse_contacts_beside(
     _refuse_beside(model, body, at + held, near, "the contact", unit)
 
 
-def transplanted(plan: Plan, model: mujoco.MjModel, body: RigidBody, grown: float) -> Plan:
-    """A plan in a world that is not as believed: the same contacts, of an object that may be larger, on a table that
-    may be inclined otherwise.
+def transplanted(placed: Placement, model: mujoco.MjModel, body: RigidBody, grown: float) -> Placement:
+    """A placement in a world that is not as believed: the same contacts, of an object that may be larger, on a table
+    that may be inclined otherwise.
 
     Args:
-        plan: as believed.  model, body: the world.
+        placed: as believed.  model, body: the world.
         grown: how many times as large the object is there.
     """
-    turned = matrix(body.table) @ matrix(plan.body.table).T
+    turned = matrix(body.table) @ matrix(placed.body.table).T
     middle = model.geom_pos[model.body_geomadr[body.index]]  # of the one box that a size may change
     return replace(
-        plan,
+        placed,
         body=body,
-        contacts=middle + grown * (plan.contacts - middle) if grown != 1.0 else plan.contacts,
-        face=middle + grown * (plan.face - middle) if grown != 1.0 else plan.face,
-        at=body.origin + turned @ (plan.at - plan.body.origin),
-        axis=turned @ plan.axis,
-        start=quaternion(turned @ matrix(plan.start)),
+        contacts=middle + grown * (placed.contacts - middle) if grown != 1.0 else placed.contacts,
+        face=middle + grown * (placed.face - middle) if grown != 1.0 else placed.face,
+        at=body.origin + turned @ (placed.at - placed.body.origin),
+        axis=turned @ placed.axis,
+        start=quaternion(turned @ matrix(placed.start)),
     )
 
 
-def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody, near: float, unit: float) -> Plan:
+def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody, near: float, unit: float) -> Placement:
     """In space the contacts are found on the object, as `contact_candidates.stance` does."""
     table, gap = matrix(body.table), np.deg2rad(LOWEST)
     data = initial_data(model)
@@ -142,7 +147,7 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody, near: float
         start, axis = matrix(quaternion_product(exponential(found.balance * axis), quaternion(start))), table[:, 2]
         limits = (-2.0 * np.pi, 2.0 * np.pi)
     at = _below(model, body, found.points[0])  # the object starts where its file has it
-    return Plan(body, found.points, found.radius, at, axis, quaternion(start), limits, found.face)
+    return Placement(body, found.points, found.radius, at, axis, quaternion(start), limits, found.face)
 
 
 def _misfit(
@@ -189,14 +194,14 @@ def _in_body_frame(points: ArrayLike, frame: tuple[Array, Array]) -> ArrayLike:
     return origin + given @ axes.T
 
 
-def _planar(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Plan:
+def _planar(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Placement:
     """In the plane the contact is the left end of the face that is down at theta = 0, unless it is given."""
     axes, table, gap = matrix(body.axes), matrix(body.table), np.deg2rad(LOWEST)
     point, radius, most = planar_stance(model, body.index, case.contact, axes, arc=_arc(case))
     face = point - radius * axes[:, 2]
     limits = (gap, most - gap)
     at = _below(model, body, point)
-    return Plan(body, point[None], np.array([radius]), at, -table[:, 1], body.table, limits, face[None])
+    return Placement(body, point[None], np.array([radius]), at, -table[:, 1], body.table, limits, face[None])
 
 
 def _below(model: mujoco.MjModel, body: RigidBody, point: Array) -> Array:

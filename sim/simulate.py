@@ -1,49 +1,40 @@
-"""A closed-loop run, from a scenario to what is measured: the world, the belief, the start, the steps."""
+"""`simulate`: a closed-loop run, from a scenario to what is measured."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
-from pivoting.controller.kernels.compilation import first_calls
 from pivoting.controller.orientation_references import Turn
-from pivoting.controller.plane_and_space import space
-from pivoting.controller.rotations import exponential, quaternion_product
 from pivoting.controller.validate import fail
 from pivoting.controller.wrench_controller import WrenchController
-from pivoting.models.contact_settings import contact_settings
-from pivoting.models.contact_softness import read_rows
 from pivoting.models.frames import matrix
-from pivoting.models.friction_coefficient import read_friction
-from pivoting.models.names import ModelError, body_id, geom_id
-from pivoting.models.placement.convex_hull import body_size
-from pivoting.models.placement.given_contacts import NEAR
-from pivoting.models.rigid_body import initial_data, place, read_body, turn
-from pivoting.models.scenes import Scene, load
-from pivoting.models.sensors import instrument
-from pivoting.sim.attach import Attached, attach
-from pivoting.sim.contact_sensing import Declared
+from pivoting.models.names import ModelError
+from pivoting.models.scenes import load
+from pivoting.sim.belief import Belief, believe
 from pivoting.sim.engine_log import engine_log
-from pivoting.sim.horizon_control import horizon_control, play_control
 from pivoting.sim.joint_drag import drag_wrench
-from pivoting.sim.judging.undeclared_contacts import contact_margin, refuse_strays
-from pivoting.sim.pace import closing_force, fine_step
-from pivoting.sim.pipeline.control import Answers, BoundedControl, Control, LawControl, States
-from pivoting.sim.pipeline.loop import ContactLog, run_steps
-from pivoting.sim.placement import Plan, planned, transplanted
-from pivoting.sim.run import Run, frozen
+from pivoting.sim.pipeline.apply_wrench import FreeWrench
+from pivoting.sim.pipeline.bounded_control import BoundedControl
+from pivoting.sim.pipeline.contact_log import ContactLog
+from pivoting.sim.pipeline.law_control import LawControl, LawSolver
+from pivoting.sim.pipeline.log import Log
+from pivoting.sim.pipeline.loop import run_steps
+from pivoting.sim.pipeline.own_control import OwnControl, OwnControlFunction
+from pivoting.sim.pipeline.plan_playback import PlanPlayback
+from pivoting.sim.pipeline.plant import Plant
+from pivoting.sim.pipeline.receding_horizon_control import RecedingHorizonControl
+from pivoting.sim.pipeline.stages import Control, Observe, Setting, Stages, build_stages
+from pivoting.sim.placement import Placement
+from pivoting.sim.run import Run
+from pivoting.sim.scenario_horizon import plan_playback, receding_horizon_control
 from pivoting.sim.scenarios.scenario import Scenario
-from pivoting.sim.scenarios.scenario_keys import CONTROL_KEYS
 from pivoting.sim.scenarios.shipped_scenarios import scenario
+from pivoting.sim.start_states import Samples, resting_depth, start_worlds
+from pivoting.sim.world import World, build_world
 
 Array = NDArray[np.float64]
-START_DEPTH = 1e-6  # of the lever from contact to CoM: how deep it starts if its load does not say
-DEEPEST = 1e-2  # likewise: how deep it may start
-PRESSED, SAMPLES = 1e-3, 17  # levers that it is pressed in, and where along its way, to see what it touches with
-Samples = tuple[Array, Array, Array]  # orientations, angular velocities and accelerations
 MAX_STEPS = 10_000_000  # worlds times steps that are kept in memory, about 0.5 kB each
 
 
@@ -53,6 +44,9 @@ def simulate(
     seed: int = 0,
     *,
     controller: WrenchController | None = None,
+    control: OwnControlFunction | None = None,
+    observe: Observe | None = None,
+    first_world: int = 0,
     progress: Callable[[int, int], None] | None = None,
     open_loop: bool = False,
     **overrides: Any,
@@ -61,10 +55,13 @@ def simulate(
 
     Args:
         name: of a shipped scenario, or a `Scenario`.
-        worlds: how many; they differ by their initial angle errors, drawn from `seed`. World i of one run is world i of
-            any other with the same seed.
+        worlds: how many; they differ by what is drawn at random from `seed`: their initial angle errors, and the noise
+            of measurements if there is any. World i of one run is world i of any other with the same seed.
         seed: same seed, same arrays, bit for bit.
         controller: to be tested in place of the scenario's own, which is built from what the scenario believes.
+        control: a function of your own that decides on the wrench in place of the controller, see `OwnControl`.
+        observe: a function of your own that estimates the states from what is measured, see `stages.Observe`.
+        first_world: number of the first world, with which one world of a larger run is run again alone.
         progress: called with (steps done, steps) about a hundred times.
         open_loop: plan the whole motion once, in steps of the scenario's `plan_step`, and apply those wrenches whatever
             happens: the run's `plan` is then to be compared with what MuJoCo makes of it.
@@ -76,18 +73,145 @@ def simulate(
     """
     if not isinstance(name, str | Scenario):
         raise fail("scenario", name, "a name or a Scenario")
-    case = (scenario(name) if isinstance(name, str) else name).change(**overrides)
-    for key, value, least in (("worlds", worlds, 1), ("seed", seed, 0)):
+    asked = (scenario(name) if isinstance(name, str) else name).change(**overrides)
+    for key, value, least in (("worlds", worlds, 1), ("seed", seed, 0), ("first_world", first_world, 0)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
             raise fail(key, value, f"a whole number >= {least}")
-    scene = load(case.path, body=case.body, support=case.support, chosen=case.chosen)
-    attached, believed = believe(case, controller, scene)
-    asked, case = case, case.absolute(believed.load)
-    world = _finely_stepped(scene.changed(case.actual), case, believed)
-    model, where = _instrumented(world)
-    truth = read_body(model, world.body, world.support)
-    plan = transplanted(believed, model, truth, world.scale / scene.changed(case.believed).scale)
-    dt = float(model.opt.timestep)
+    begun = _set_up(asked, controller, (int(seed), int(worlds), int(first_world)))
+    decided = _control(begun, control, observe, open_loop)
+    return _run(begun, decided, progress)
+
+
+class _Begun(NamedTuple):
+    """A run that is about to begin: the scenario as it was asked for and `absolute`, and all that follows from it.
+
+    reference: angles, rates, accelerations (N+1,).  desired, told: orientations and their rates, as the world has the
+    table and as the controller knows it.  follow: the latter at any time.  setting: of the stages.
+    """
+
+    asked: Scenario
+    case: Scenario
+    belief: Belief
+    world: World
+    time: Array
+    reference: Samples
+    desired: Samples
+    told: Samples
+    follow: Turn
+    setting: Setting
+    given: bool
+
+    @property
+    def steps(self) -> int:
+        return len(self.time) - 1
+
+
+class _Decided(NamedTuple):
+    """What decides: the control, with the law that it ends in, the stages around it, and whose it is."""
+
+    control: Control
+    per_step: LawControl
+    stages: Stages
+    whose: str
+
+
+def _set_up(asked: Scenario, controller: WrenchController | None, counts: tuple[int, int, int]) -> _Begun:
+    """The world and the belief of a scenario; `counts`: seed, worlds, first world."""
+    scene = load(asked.path, body=asked.body, support=asked.support, chosen=asked.chosen)
+    belief = believe(asked, scene, controller)
+    case = asked.absolute(belief.placement.load)
+    world = build_world(case, belief.scene, scene, belief.placement)
+    time = _times(case, world.dt, counts[1])
+    reference, desired, _ = _desired(case, world.placement, time)
+    told, follow = _desired(case, belief.placement, time)[1:]  # the controller knows only the table that it believes in
+    for values in (time, *reference, *desired):
+        values.flags.writeable = False
+    turning = -matrix(belief.placement.body.table)[:, 1:2].T if belief.placement.body.dim == 2 else np.eye(3)
+    setting = Setting(*counts, world.dt, turning, case.law, case.bandwidth, case.damping)
+    return _Begun(
+        asked, case, belief, world, time, reference, desired, told, follow, setting, given=controller is not None
+    )
+
+
+def _control(begun: _Begun, own: OwnControlFunction | None, observe: Observe | None, open_loop: bool) -> _Decided:
+    """The scenario's control, or the user's own, and the stages around it."""
+    case, (_, attached, there) = begun.case, begun.belief
+    stages = build_stages(case.stages, begun.setting)
+    if observe is not None:
+        stages = stages._replace(observe=(*stages.observe, observe))
+    bounds, dt = case.bounds(there.unit), begun.world.dt
+    law = LawSolver(attached.controller, bounds, stages.correct)
+    per_step = LawControl(law, begun.told, drag_wrench(attached.body, attached.controller, *begun.told))
+    if own is not None:
+        return _Decided(OwnControl(own, begun.told, dt), per_step, stages, "own control")
+    if attached.body.drag is not None and (open_loop or case.plan_hz is not None):
+        raise ModelError(f"body = {attached.body.name!r}: a plan knows no joint damping or friction; must have none")
+    control: Control = per_step
+    if open_loop:
+        control = plan_playback(case, begun.belief, begun.follow, dt, begun.steps)
+    elif case.plan_hz is not None:
+        worlds = begun.setting.worlds
+        control = receding_horizon_control(case, begun.belief, law, begun.follow, worlds, dt, begun.steps)
+    if bounds.any and not open_loop:  # a plan is within them
+        control = BoundedControl(control, attached.controller, bounds, dt)
+    return _Decided(control, per_step, stages, "given" if begun.given else "scenario")
+
+
+def _run(begun: _Begun, decided: _Decided, progress: Callable[[int, int], None] | None) -> Run:
+    """Start the worlds, make the steps, and keep what came of them."""
+    world, attached = begun.world, begun.belief.attached
+    seed, worlds, first = begun.setting[:3]
+    batch = Batch(world.model, worlds, nthread=1 if worlds == 1 else 0, persistent=True)
+    errors = np.random.default_rng(seed).uniform(-1.0, 1.0, first + worlds)[first:]
+    depth = resting_depth(world, attached, decided.per_step, begun.told) if begun.case.chosen else 0.0
+    start_worlds(batch, world, begun.desired, np.deg2rad(begun.case.spread) * errors, depth)
+    start = np.array(batch.bind("qpos")), np.array(batch.bind("qvel"))
+    for values in start:
+        values.flags.writeable = False
+    table, wrench_map = matrix(world.truth.table), attached.controller.belief.wrench_map
+    contacts = ContactLog(world.declared, world.contact_rows, table, world.sensors, begun.steps, worlds)
+    apply, widths = FreeWrench(batch, wrench_map, world.truth.index), attached.controller.widths
+    with engine_log() as warned:
+        log, wall_s = run_steps(
+            Plant(batch), decided.stages, decided.control, apply, contacts, begun.steps, widths, progress
+        )
+    return _kept(begun, decided, start, log, wall_s, (*world.warned, *warned))
+
+
+def _kept(
+    begun: _Begun,
+    decided: _Decided,
+    start: tuple[Array, Array],
+    log: Log,
+    wall_s: float,
+    warnings: tuple[str, ...],
+) -> Run:
+    """The finished run."""
+    planned = decided.control.inner if isinstance(decided.control, BoundedControl) else decided.control
+    horizons = planned if isinstance(planned, RecedingHorizonControl) else None
+    return Run(
+        scenario=begun.asked,
+        seed=begun.setting.seed,
+        first_world=begun.setting.first_world,
+        attached=begun.belief.attached,
+        load=begun.belief.placement.load,
+        world=begun.world,
+        start=start,
+        time=begun.time,
+        reference=begun.reference,
+        desired=begun.desired,
+        log=log,
+        wall_s=wall_s,
+        plan=planned.plan if isinstance(planned, PlanPlayback) else None,
+        plans=None if horizons is None else horizons.log,
+        events=() if horizons is None else tuple(horizons.events),
+        engine_warnings=warnings,
+        controller=decided.whose,
+    )
+
+
+def _times(case: Scenario, dt: float, worlds: int) -> Array:
+    """(N+1,) when each step begins, and the last ends [s]."""
     steps = round(case.duration / dt)
     if not 2 <= steps <= MAX_STEPS:
         raise fail("seconds", case.duration, f"such that a world takes 2 to {MAX_STEPS} steps, at dt = {dt:g} s")
@@ -98,249 +222,19 @@ def simulate(
     if steps * dt <= case.limits.settle_s:
         raise fail("seconds", case.duration, f"more than the {case.limits.settle_s:g} s that the verdict lets settle")
     time: Array = dt * np.arange(steps + 1, dtype=float)
-    reference, desired, _ = _desired(case, plan, time)
-    # the controller knows only the table that it believes in
-    told, follow = _desired(case, believed, time)[1:]
-    for values in (time, *reference, *desired):
-        values.flags.writeable = False
-    pressed = list(_pressed(model, plan, desired[0][np.linspace(0, steps, SAMPLES).astype(int)]))
-    settings = None
-    if case.chosen and not {"timeconst", "impedance"} & set(case.actual):
-        settings = contact_settings(model, truth.index, truth.support, pressed, dt)
-        model, where = _instrumented(world.with_contacts(settings))
-    rows = read_rows(model, truth.index, truth.support, pressed)
-
-    batch = Batch(model, int(worlds), nthread=1 if worlds == 1 else 0, persistent=True)
-    errors = np.deg2rad(case.spread) * np.random.default_rng(seed).uniform(-1.0, 1.0, int(worlds))
-    bounds = case.bounds(scene.unit)
-    drag = drag_wrench(attached.body, attached.controller, *told)
-    depth = 0.0
-    if case.chosen and rows is not None:
-        first = _load(attached.controller, LawControl(attached.controller, told, bounds, drag), told)
-        depth = float(rows.depth(np.array(first / rows.points)))
-    _start(batch, model, plan, desired, errors, depth)
-    start = (np.array(batch.bind("qpos")), np.array(batch.bind("qvel")))
-    for values in start:
-        values.flags.writeable = False
-
-    control: Control = LawControl(attached.controller, told, bounds, drag)
-    horizons = played = None
-    if attached.body.drag is not None and (open_loop or case.plan_hz is not None):
-        raise ModelError(f"body = {attached.body.name!r}: a plan knows no joint damping or friction; must have none")
-    if open_loop:
-        control = played = play_control(case, attached, believed, follow, dt, steps)
-    elif case.plan_hz is not None:
-        control = horizons = horizon_control(case, attached, believed, follow, int(worlds), dt, steps)
-    if bounds.any and not open_loop:  # a plan is within them
-        control = BoundedControl(control, attached.controller, bounds, dt)
-    K, d = len(plan.contacts), truth.dim
-    declared = Declared(
-        points=np.array([space(d).lift(truth.point(contact)) for contact in plan.contacts]),
-        up=plan.radius[:, None] * matrix(truth.table)[:, 2],
-        across=np.ascontiguousarray(matrix(truth.table)[:, : d - 1].T),
-        near=float(NEAR * body_size(model, truth.index)),
-        landing=case.limits.contacts_end > 0,
-    )
-    contacts = ContactLog(declared, rows, matrix(truth.table), where, steps, int(worlds))
-    with engine_log() as warned:
-        log = run_steps(batch, control, attached.controller, contacts, truth.index, where, steps, progress)
-    axes = matrix(truth.table) @ space(d).force_map
-    return Run(
-        scenario=asked,
-        seed=int(seed),
-        attached=attached,
-        load=believed.load,
-        unit=scene.unit,
-        replaced=world.replaced,
-        settings=settings,
-        model=model,
-        truth=truth,
-        declared=declared,
-        radius=plan.radius,
-        face=np.array([space(d).lift(truth.point(corner)) for corner in plan.face]),
-        turn=(plan.axis, plan.start),
-        mu_world=read_friction(model, truth.index, truth.support, plan.contacts),
-        contact_rows=rows,
-        start=start,
-        time=time,
-        reference=reference,
-        desired=desired,
-        position=log.states.position,
-        quaternion=log.states.orientation,
-        velocity=log.states.velocity,
-        angular_velocity=log.states.angular_velocity,
-        required=log.answers.required,
-        wrench=log.answers.wrench,
-        wrench_world=log.wrench_world,
-        force=log.answers.force.reshape(worlds, steps, K, d),
-        force_measured=frozen(log.contacts.force @ axes),
-        contacts=log.contacts,
-        held=log.held,
-        residual=log.answers.residual,
-        status=log.answers.status,
-        control_us=frozen(log.control_ns / (1e3 * worlds)),
-        wall_s=log.wall_s,
-        plan=None if played is None else played.plan,
-        plans=None if horizons is None else horizons.log,
-        events=() if horizons is None else tuple(horizons.events),
-        engine_warnings=(*world.warned, *warned),
-        controller="scenario" if controller is None else "given",
-    )
+    return time
 
 
-def _finely_stepped(world: Scene, case: Scenario, plan: Plan) -> Scene:
-    """With a finer time step, where the settings are chosen and an object so large would drift too far as it turns."""
-    if not case.chosen or "dt" in case.actual:
-        return world
-    # what the object may slip, whatever it is judged by
-    limits = replace(case.limits, slip_m=None).for_object(
-        plan.load.lever, plan.unit * float(np.linalg.norm(plan.body.gravity))
-    )
-    assert limits.slip_m is not None, "limits are for a lever"
-    given = float(world.spec.option.timestep)
-    dt = fine_step(given, plan.unit * plan.arm, *case.pace, limits.slip_m)
-    if dt == given:
-        return world
-    finer = world.changed({**case.actual, "dt": dt})
-    return replace(finer, replaced=(*finer.replaced, ("timestep", f"{given:g}")))
-
-
-def _instrumented(world: Scene) -> tuple[mujoco.MjModel, dict[str, slice]]:
-    """The model that is simulated, and where each reading is in its sensordata."""
-    model, where = instrument(world)
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that diverges is seen, not reset
-    # bodies of several geoms: a plane's bounding box is 5e9 m deep there, and misses contacts of less than 1e-6 m
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
-    return model, where
-
-
-def _pressed(model: mujoco.MjModel, plan: Plan, orientations: Array) -> Iterator[Array]:
-    """The qpos of the object pressed on its contact at each of these orientations (S, 4)."""
-    data, up, point = initial_data(model), matrix(plan.body.table)[:, 2], plan.contacts[0]
-    lever = float(np.linalg.norm(plan.body.com - point) + plan.radius[0])
-    for orientation in orientations:
-        place(model, data, plan.body, orientation, point, plan.at + (plan.radius[0] - PRESSED * lever) * up)
-        yield np.array(data.qpos)
-
-
-def _load(controller: WrenchController, law: LawControl, told: Samples) -> float:
-    """The normal force [N] on all contacts with which the law begins."""
-    states = States.turning(told[0][:1], told[1][:1])
-    nw, d, K = len(controller.Q_w), controller.space.dim, len(controller.contacts)
-    out = Answers(np.empty((1, nw)), np.empty((1, nw)), np.empty((1, K * d)), np.empty(1), np.empty(1, np.int8))
-    with first_calls():
-        law(0, states, None, out)
-    return float(out.force.reshape(K, d)[:, -1].sum())
-
-
-def _start(
-    batch: Batch,
-    model: mujoco.MjModel,
-    plan: Plan,
-    desired: tuple[Array, Array, Array],
-    errors: Array,
-    depth: float,
-) -> None:
-    """Put every world on its contact, off the reference by `errors` (W,) [rad].
-
-    Everything else is where the model's first keyframe, or else qpos0, has it.
-
-    Args:
-        depth: at which it rests under its load, 0 if that is not known [m]; one that has less to carry at first would
-            slide, and one that has more is thrown up.
-
-    Raises:
-        ModelError: the object would touch something else there; it is named.
-    """
-    body = plan.body
-    data, up, point = initial_data(model), matrix(body.table)[:, 2], plan.contacts[0]
-    lever = float(np.linalg.norm(body.com - point) + plan.radius[0])
-    depth = min(depth or START_DEPTH * lever, DEEPEST * lever)
-    kind, floats = int(mujoco.mjtState.mjSTATE_INTEGRATION), 0.0
-    state = np.empty(mujoco.mj_stateSize(model, kind))
-    for row, error in zip(batch.state, errors, strict=True):
-        for _ in range(2):  # a contact with a margin holds the body above the table: how far, only MuJoCo knows
-            at = plan.at + (plan.radius[0] + floats - depth) * up
-            place(model, data, body, quaternion_product(exponential(error * plan.axis), desired[0][0]), point, at)
-            touching = point - plan.radius[0] * up @ data.xmat[body.index].reshape(3, 3)
-            turn(model, data, body, desired[1][0], touching)
-            mujoco.mj_forward(model, data)
-            if floats or not (floats := contact_margin(model, data, body)):
-                break
-        refuse_strays(model, data, body, plan.unit)
-        mujoco.mj_getState(model, data, state, kind)
-        row[:] = state
-
-
-def believe(
-    case: Scenario, controller: WrenchController | None = None, scene: Scene | None = None
-) -> tuple[Attached, Plan]:
-    """The controller of a scenario (or another) attached to the world that the scenario believes in, and its plan."""
-    read = scene or load(case.path, body=case.body, support=case.support, chosen=case.chosen)
-    believed = read.changed(case.believed)
-    nominal = believed.compile()
-    case = replace(case, body=believed.body, support=believed.support)
-    plan = planned(case, nominal, read.unit)
-    if case.chosen and case.mu is None:  # what the file itself says of friction holds: it may have none
-        read_friction(read.read, body_id(read.read, read.body), geom_id(read.read, read.support), plan.contacts)
-    if controller is not None:
-        _check(controller, case, plan)
-    floor = (case.f_min or 0.0) if controller is None else controller.belief.f_min.max()
-    if plan.load.force == 0.0 and floor == 0.0:
-        raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the object on its support")
-    if controller is not None:
-        return Attached(nominal, plan.body, controller), plan
-    attached = attach(
-        nominal,
-        body=case.body,
-        contacts=list(plan.contacts),
-        radius=plan.radius,
-        law=case.control_law(),
-        mu=case.mu,
-        margin=case.margin,
-        f_min=_floor(case.absolute(plan.load), plan) / read.unit,
-        Q_w=case.wrench_weight(plan.body.dim, read.unit),
-        support=case.support,
-    )
-    return attached, plan
-
-
-def _floor(case: Scenario, plan: Plan) -> float:
-    """Of each contact's normal force [N]."""
-    if case.f_min is not None:
-        return float(case.f_min)
-    return closing_force(plan.body.mass, plan.unit * plan.arm, case.pace[1])
-
-
-def _check(controller: WrenchController, case: Scenario, plan: Plan) -> None:
-    """Refuse a controller that is not of these contacts, or that the loop would not ask."""
-    if not isinstance(controller, WrenchController):
-        raise fail("controller", controller, "a WrenchController")
-    if [contact.dim for contact in controller.contacts] != [plan.body.dim] * len(plan.contacts):
-        kind = "planar" if plan.body.dim == 2 else "spatial"
-        given = f"one with {len(controller.contacts)} contacts in dimension {controller.space.dim}"
-        raise fail("controller", given, f"of {len(plan.contacts)} {kind} contact{'s' * (len(plan.contacts) > 1)}")
-    for name in ("problem", "jacobian"):
-        if getattr(getattr(controller, name), "__func__", None) is not getattr(WrenchController, name):
-            allowed = (
-                f"without a {name}() of its own: the compiled loop states the problems of all worlds from `belief`"
-            )
-            raise fail("controller", type(controller).__name__, allowed + ", and would never call it")
-    ignored = [key for key in CONTROL_KEYS if key in case.changes]
-    if ignored:
-        raise fail(ignored[0], case.changes[ignored[0]], "left out: the controller that is given has its own")
-
-
-def _desired(case: Scenario, plan: Plan, time: Array) -> tuple[Samples, Samples, Turn]:
+def _desired(case: Scenario, there: Placement, time: Array) -> tuple[Samples, Samples, Turn]:
     """The reference at every step, as angles and as orientations, and as what gives the latter at any time.
 
     Checked: whatever it says of itself, it has to keep the object on its contact.
     """
     angle, rate, acceleration = case.samples(time)
     low, high = np.rad2deg([angle.min(), angle.max()])
-    least, most = np.rad2deg(plan.range)
+    least, most = np.rad2deg(there.range)
     if not least - 1e-9 <= low <= high <= most + 1e-9:
         raise fail("reference", f"angles from {low:g} to {high:g} deg", f"in [{least:.4g}, {most:.4g}] deg")
-    turn = Turn(case.motion, plan.axis, plan.start)
+    turn = Turn(case.motion, there.axis, there.start)
     q, omega, alpha = (np.array(values, dtype=float) for values in turn(time))
     return (angle, rate, acceleration), (q, omega, alpha), turn

@@ -88,7 +88,7 @@ def test_what_it_says_is_so(name: str, failing: dict[str, Run]) -> None:
             k = int(np.abs(run.time - said[0]).argmin())
             assert use[max(k - 2, 0) : k + 3].max() >= SLIDES > use[: max(k - 2, 0)].max(initial=0.0)
             assert said[1] == pytest.approx(np.rad2deg(run.theta[0, k]), rel=0.02)
-            assert said[2] == pytest.approx(run.mu_world, rel=0.01)
+            assert said[2] == pytest.approx(run.world.mu, rel=0.01)
         elif reason.startswith("the contact let go at"):
             k = int(np.abs(run.time - said[0]).argmin())
             assert (~(push[max(k - 2, 0) : k + 3] > 0.0).any(axis=1)).any()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pivoting.controller import Body, Contact, Law, WrenchController
 from pivoting.sim import Run, assert_sticking, assert_tracking, simulate
-from pivoting.sim.pipeline import loop
+from pivoting.sim.pipeline import apply_wrench
 
 
 def failed(run: Run) -> set[str]:
@@ -50,13 +50,13 @@ def test_the_wrench_in_the_wrong_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     def unturned(wrench_map: np.ndarray, q: np.ndarray, wrench: np.ndarray, out: np.ndarray) -> None:
         out[:] = wrench @ wrench_map
 
-    monkeypatch.setattr(loop, "world_wrench", unturned)
+    monkeypatch.setattr(apply_wrench, "world_wrench", unturned)
     run = simulate("balance-2d", seconds=2.0)
     assert run.verdict == "fail"
 
 
 def test_the_wrench_not_applied_at_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loop, "world_wrench", lambda wrench_map, q, wrench, out: out.fill(0.0))
+    monkeypatch.setattr(apply_wrench, "world_wrench", lambda wrench_map, q, wrench, out: out.fill(0.0))
     run = simulate("balance-2d", seconds=1.0)
     assert {"angle_error_rms_deg", "force_mismatch_rel"} <= failed(run)
     with pytest.raises(AssertionError, match="angle_error_rms_deg"):
@@ -89,13 +89,13 @@ def test_quasi_dynamic_law_oscillates() -> None:
 
 def test_a_world_that_diverges_fails_and_takes_no_other_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """One world's wrench is blown up: its states stop being numbers, its neighbours pass."""
-    honest = loop.world_wrench
+    honest = apply_wrench.world_wrench
 
     def blown(wrench_map: np.ndarray, q: np.ndarray, wrench: np.ndarray, out: np.ndarray) -> None:
         honest(wrench_map, q, wrench, out)
         out[1] *= 1e300
 
-    monkeypatch.setattr(loop, "world_wrench", blown)
+    monkeypatch.setattr(apply_wrench, "world_wrench", blown)
     run = simulate("balance-2d", worlds=3, seconds=1.0)
     assert run.failed_worlds.tolist() == [1]
     assert run.status[1].max() == 2

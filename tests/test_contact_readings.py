@@ -38,7 +38,7 @@ def test_forces_add_up_to_mujocos(kind: str, tmp_path: Path) -> None:
     assert run.measures.undeclared_contact_s[0] == 0.0
     model, data, body = run.model, initial_data(run.model), run.truth.index
     data.qpos[:], data.qvel[:] = (values[0] for values in run.start)
-    sunk = 3.0 * float(run.contacts.depth.max() * np.abs(run.force_measured).max())  # MuJoCo puts it half as deep
+    sunk = 3.0 * float(run.log.contacts.depth.max() * np.abs(run.force_measured).max())  # MuJoCo puts it half as deep
     force = run.force_measured[0] @ (run.table_axes @ run.space.force_map).T
     for k in range(len(run.time) - 1):
         data.xfrc_applied[body] = run.wrench_world[0, k]

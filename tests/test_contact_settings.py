@@ -26,8 +26,8 @@ def turned(folder: Path, geoms: str, contact: str = "edge", dt: float = 0.002, e
 
 
 def settings(run: Run) -> ContactSettings:
-    assert run.settings is not None
-    return run.settings
+    assert run.world.settings is not None
+    return run.world.settings
 
 
 def in_steps(run: Run) -> tuple[float, float, float]:
@@ -61,7 +61,7 @@ def test_coincident_boxes_are_as_one(tmp_path: Path, size: str, contact: str) ->
     for run, count in zip(runs, (6, 20), strict=True):
         holds(run)
         assert settings(run).contacts == count * (2 if contact == "edge" else 1)
-        rows, d = run.contact_rows, settings(run).impedance
+        rows, d = run.world.contact_rows, settings(run).impedance
         assert rows is not None
         assert rows.b * rows.h == pytest.approx(2.0 / (0.5 * 2.1))
         assert rows.k * d * rows.h**2 == pytest.approx(0.5 / (0.5 * 2.1) ** 2)
@@ -117,7 +117,7 @@ def test_with_the_shipped_settings_they_would_bounce(tmp_path: Path) -> None:
         bh, kh2 = 2.0 / (0.5 * 2.1), 0.5 / (0.5 * 2.1) ** 2
         assert (coupling / (coupling + 1.0) * (2.0 * bh + kh2) < 4.0) == stable
         run = turned(tmp_path, boxes(PLATE, count), timeconst=0.0042)
-        assert run.settings is None
+        assert run.world.settings is None
         assert (run.measures.contact_lost_s[0] == 0.0) == stable
 
 
@@ -159,7 +159,7 @@ LIGHT = '<inertial pos="0 0 0" mass="1" diaginertia="{0} {0} {0}"/><geom type="b
 def test_one_contact_of_a_body_of_little_inertia_holds(tmp_path: Path, inertia: float) -> None:
     """A plate whose lever weighs 20 to 800 times its inertia: it rings no longer than a box does."""
     run = turned(tmp_path, LIGHT.format(inertia), "vertex")
-    chosen, rows = settings(run), run.contact_rows
+    chosen, rows = settings(run), run.world.contact_rows
     assert rows is not None
     assert chosen.alone == chosen.coupling > COUPLED
     assert (chosen.dampratio, chosen.impedance) == (1.0, 0.5)

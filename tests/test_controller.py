@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from pivoting.controller import Body, Contact, Law, Motion, WrenchController, solve
+from pivoting.controller.kernels.compiled_step import step_worlds, world_wrench
 from pivoting.controller.kernels.kernel_cache import drop_stale
-from pivoting.controller.wrench_controller import step_worlds, world_wrench
 from scipy.spatial.transform import Rotation
 
 BLOCK = WrenchController(
@@ -33,6 +33,11 @@ class Stepped(NamedTuple):
     status: np.ndarray
 
 
+def states(q: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """(W, 13) of which only orientations (W, 4) and angular velocities (W, 3) matter."""
+    return np.hstack([np.zeros((len(q), 3)), q, np.zeros((len(q), 3)), omega])
+
+
 def stepped(
     controller: WrenchController,
     q: np.ndarray,
@@ -47,7 +52,7 @@ def stepped(
     reference = [values[None] for values in controller.space.lift_motion(desired)]
     known = np.zeros((1, nw)) if external is None else external
     belief = tuple(controller.belief)
-    step_worlds(belief, None, *controller.workspace(), tolerance, q, omega, *reference, known, *out)
+    step_worlds(belief, None, *controller.workspace(), tolerance, states(q, omega), *reference, known, *out)
     return out
 
 

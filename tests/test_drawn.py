@@ -8,13 +8,14 @@ import mujoco
 import numpy as np
 import pytest
 from pivoting.controller import Body, Contact, Law, WrenchController
+from pivoting.controller.solution import BOUNDED, FAILED
 from pivoting.sim import Run, own_object, simulate
 from pivoting.sim.drawing.recorded_world import Film
 from pivoting.sim.drawing.recording_id import digest
 from pivoting.sim.drawing.rerun_recording import record
-from pivoting.sim.pipeline.control import BOUNDED, FAILED
 from scipy.spatial.transform import Rotation
 
+from tests.altered_runs import altered
 from tests.own_files import mjcf, pivoted
 from tests.recordings import one_each, read, steps
 
@@ -117,7 +118,7 @@ def test_without_an_answer_nothing_is_drawn_of_one(tmp_path: Path) -> None:
     run = simulate("balance-2d", seconds=0.6)
     status, wrench, world = np.array(run.status), np.array(run.wrench), np.array(run.wrench_world)
     status[0, 300:], wrench[0, 300:], world[0, 300:] = FAILED, np.nan, 0.0
-    entities = read(record(replace(run, status=status, wrench=wrench, wrench_world=world), tmp_path / "run.rrd"))
+    entities = read(record(altered(run, status=status, wrench=wrench, wrench_world=world), tmp_path / "run.rrd"))
     late = steps(entities["/wrench_space/wrench"]) >= 300
     assert late.any()
     assert not one_each(entities["/wrench_space/wrench"]["Arrows3D:vectors"])[late].any()

@@ -21,7 +21,7 @@ from pivoting.controller import (
 )
 from pivoting.controller.bounded_solver import BoundedSolver, BoundedWrench
 from pivoting.sim import simulate
-from pivoting.sim.pipeline import control
+from pivoting.sim.pipeline import bounded_control
 
 BLOCK = WrenchController(Body(1.0, 1.0 / 6.0), [Contact((-0.5, -0.5), 0.3)], Law.dynamic(), (0.0, -10.0), margin=1 / 6)
 START, END, STEPS, H = np.deg2rad(10.0), np.deg2rad(80.0), 50, 0.02
@@ -92,7 +92,7 @@ class Poor(BoundedSolver):
 
 def test_a_poor_answer_within_bounds_is_applied_and_said_to_be_poor(monkeypatch: pytest.MonkeyPatch) -> None:
     """None at all would let the object fall. Two bounds at once are more than a heavier weight."""
-    monkeypatch.setattr(control, "BoundedSolver", Poor)
+    monkeypatch.setattr(bounded_control, "BoundedSolver", Poor)
     run = simulate("balance-2d", seconds=0.6, force_max=3.3, moment_max=0.9)
     assert np.isfinite(run.wrench).all()
     assert run.measures.unsolved_steps[0] > 0.0

@@ -3,7 +3,6 @@
 import io
 import json
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,8 @@ from pivoting.sim import Run, own_object, simulate
 from pivoting.sim.console.tables import jsonable, print_run
 from pivoting.sim.judging.measures import predicted_slip, slip_floor_unknown
 from rich.console import Console
+
+from tests.altered_runs import altered
 
 BOX = '<geom type="box" size=".05 .04 .06" mass="1" {}/>'
 STACK = '<geom type="box" size=".1 .098 .115" pos="0 0 .115"/><geom type="box" size=".1 .098 .07" pos="0 0 .3"/>'
@@ -168,9 +169,9 @@ def test_an_end_of_an_edge_may_be_without_contact_for_a_while(
 ) -> None:
     """As that of a mesh, to which MuJoCo gives one contact, at either end in turn; at the start both may be."""
     run = shipped("pivot-3d")
-    give = run.held.give.copy()
+    give = run.log.held.give.copy()
     give[:, first, 0] = give[:, second, 1] = np.nan
-    less = replace(run, held=run.held._replace(give=give))
+    less = altered(run, held=run.log.held._replace(give=give))
     assert slip_floor_unknown(less) == reason
     if not reason:
         told(less)
@@ -195,7 +196,7 @@ def test_an_object_of_ones_own_starts_at_rest(tmp_path: Path, contact: str) -> N
     small = '<geom type="box" size=".005 .004 .006" mass=".1"/>'
     run = own(tmp_path, body=small, contact=contact, chosen=True, mu=0.3, theta=25.0, theta_end=5.0)
     np.testing.assert_allclose(run.force_measured[0, 0], run.force[0, 0], rtol=0.05, atol=0.005)
-    assert not run.held.slides.any()
+    assert not run.log.held.slides.any()
     assert np.diff(run.corner[0, [0, -1], 0, 2])[0] > 1e-6
     assert run.measures.contact_lost_s[0] == 0.0
 
@@ -204,7 +205,7 @@ def test_creep_under_a_constant_load() -> None:
     """Once settled it is -R_t f_t / b, which goes with 1 / impratio."""
     for impratio in (1000.0, 1.0):
         run = simulate("balance-2d", impratio=impratio, seconds=2.0, spread=0.0)
-        rows, f_t = run.contact_rows, run.force[0, -1, 0, 0]
+        rows, f_t = run.world.contact_rows, run.force[0, -1, 0, 0]
         assert rows is not None
         R_t = rows.D[1] * rows.softness(np.array(0.0))
         late = run.slip[0, -1, 0, 0] - run.slip[0, run.time.size // 2, 0, 0]
@@ -217,7 +218,7 @@ def test_rotation_and_depth_while_turning() -> None:
     """Once settled they are c_t (1 / b - h / 2) and w delta / 2, at the depth where k delta = R_n f_n."""
     for timeconst in (0.003, 0.0021):
         run = simulate("pivot-2d", timeconst=timeconst, spread=0.0, seconds=4.0, impratio=1e6)
-        rows = run.contact_rows
+        rows = run.world.contact_rows
         assert rows is not None
         w = run.angular_velocity[0] @ run.table_axes
         c = np.cross(w[:, None], np.cross(w[:, None], run.turning[0]))[:-1, 0]

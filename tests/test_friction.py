@@ -79,12 +79,12 @@ def test_without_friction_nothing_sticks(text: str, tmp_path: Path) -> None:
 )
 def test_the_least_of_both_tangents_is_planned_with(extra: str, option: str, mu: float, tmp_path: Path) -> None:
     run = simulate(own(tmp_path, mjcf(extra=extra, option=option)))
-    assert run.mu_world == pytest.approx(mu)
+    assert run.world.mu == pytest.approx(mu)
     assert run.attached.controller.contacts[0].mu == pytest.approx(mu)
     assert run.verdict == "pass"
     assert run.measures.slip_max_m[0] < 1e-5
     run = simulate(own(tmp_path, mjcf(extra=extra, option=option)), mu=0.4)  # a key says otherwise, of both tangents
-    assert (run.mu_world, run.verdict) == (0.4, "pass")
+    assert (run.world.mu, run.verdict) == (0.4, "pass")
 
 
 def test_geoms_that_are_at_the_contact_count() -> None:

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 from pivoting.controller import Motion, solve
+from pivoting.controller.kernels.compiled_step import world_wrench
 from pivoting.controller.orientation_references import Turn
-from pivoting.controller.wrench_controller import world_wrench
 from pivoting.models import ModelError
 from pivoting.sim import attach, simulate
 from pivoting.sim.joint_drag import drag_wrench

@@ -64,7 +64,7 @@ def test_a_kernel_that_allocates_is_refused() -> None:
 
 
 LOOPS = """
-from pivoting.controller.wrench_controller import step_worlds
+from pivoting.controller.kernels.compiled_step import step_worlds
 from pivoting.sim import own_object, simulate
 simulate("spin-3d")
 simulate(own_object({path!r}, "block", "vertex"))

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 from pivoting.controller import Body, Contact, Law, Motion, WrenchController
-from pivoting.controller.wrench_controller import world_wrench
+from pivoting.controller.kernels.compiled_step import world_wrench
 from pivoting.models import load, scene_path
 
 CORNER = Contact((-0.5, -0.5), 0.3)

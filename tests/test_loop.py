@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from pivoting.controller import Motion, WrenchController, WrenchProblem, solve
 from pivoting.controller.references import Constant, Sampled
+from pivoting.controller.solution import BOUNDED
 from pivoting.controller.wrench_controller import Belief
 from pivoting.sim import SCENARIOS, Run, assert_sticking, assert_tracking, own_object, simulate
-from pivoting.sim.pipeline.control import BOUNDED
 from scipy.spatial.transform import Rotation
 
 
@@ -33,7 +33,7 @@ def test_incline_measures_the_printed_force(shipped: Callable[[str], Run]) -> No
     np.testing.assert_allclose(measured, np.tile([1.39789, 4.65964], (len(measured), 1)), rtol=0.002)
     assert run.measures.force_mismatch_rel[0] <= 0.01
     assert run.verdict == "pass"
-    assert run.mu_world == 0.4
+    assert run.world.mu == 0.4
     assert run.attached.controller.contacts[0].mu == 0.3
 
 

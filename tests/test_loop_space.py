@@ -242,4 +242,4 @@ def test_given_corners_are_turned_from_the_face_that_is_down(tmp_path: Path) -> 
     )  # fmt: skip
     run = turn_object(tmp_path, standing, [[-0.03, -0.04, -0.07], [-0.03, 0.04, -0.07]])
     assert run.verdict == "pass"
-    np.testing.assert_allclose(np.sort(run.face, axis=0)[:, 2], -0.07, atol=1e-9)
+    np.testing.assert_allclose(np.sort(run.world.face, axis=0)[:, 2], -0.07, atol=1e-9)

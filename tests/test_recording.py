@@ -4,7 +4,6 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from pivoting.sim.judging.measures import predicted_slip
 from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
+from tests.altered_runs import altered
 from tests.recordings import Columns, one_each, read, steps
 
 
@@ -259,7 +259,7 @@ def test_a_world_that_diverges_is_recorded_up_to_there(run: Run, tmp_path: Path,
     )
     velocity[1, 300:], position[1, 301:] = poison, np.nan
     force[1, 299:], wrench[1, 250] = poison, np.nan
-    bad = replace(run, velocity=velocity, position=position, force_measured=force, wrench=wrench)
+    bad = altered(run, velocity=velocity, position=position, force_measured=force, wrench=wrench)
     entities = read(record(bad, tmp_path / "bad.rrd", world=1))
     for entity in ("/plots/angle/theta", "/plots/wrench/M", "/world/block", "/wrench_space/wrench"):
         assert 280 <= steps(entities[entity])[-1] < 300, entity
@@ -276,7 +276,7 @@ def test_a_world_that_diverges_is_recorded_up_to_there(run: Run, tmp_path: Path,
 
 
 def test_a_world_that_is_nowhere_from_the_start(run: Run, tmp_path: Path) -> None:
-    lost = replace(run, position=np.full_like(run.position, np.nan))
+    lost = altered(run, position=np.full_like(run.position, np.nan))
     ((text,),) = read(record(lost, tmp_path / "lost.rrd"))["/report"]["static TextDocument:text"].to_pylist()
     assert "diverged at 0 s" in text
 
@@ -327,7 +327,7 @@ def test_in_space(name: str, tmp_path: Path) -> None:
             assert np.array_equal(plotted[0], forces[0, :, i, 2])
             assert np.allclose(plotted[1], np.hypot(*forces[0, :, i, :2].T), rtol=1e-12)
         floor = scale * run.scenario.f_min
-        for which, mu, low in (("planned", run.attached.controller.belief.mu[i], floor), ("world", run.mu_world, 0.0)):
+        for which, mu, low in (("planned", run.attached.controller.belief.mu[i], floor), ("world", run.world.mu, 0.0)):
             lines = entities[f"{entity}/cone/{which}"]["static LineStrips3D:strips"].to_pylist()[0]
             (left, apex, right), (bottom, top) = np.array(lines[0]), map(np.array, lines[-2:])
             assert apex.tolist() == [0.0, 0.0, 0.0]

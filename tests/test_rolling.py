@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 from pivoting.controller import Body, Contact, Law, Motion, WrenchController
+from pivoting.controller.kernels.compiled_step import world_wrench
 from pivoting.controller.orientation_references import Turn
-from pivoting.controller.wrench_controller import world_wrench
 from pivoting.models import ModelError, load, read_body
 from pivoting.models.placement.convex_hull import read_hull
 from pivoting.models.placement.resting_faces import faces
@@ -146,7 +146,7 @@ def test_the_required_wrench_makes_a_free_body_roll(radius: float) -> None:
 
 def test_a_capsule_is_pivoted_on_its_cap(pill: Run) -> None:
     rolls(pill)
-    assert pill.radius.tolist() == [0.03]
+    assert pill.world.radius.tolist() == [0.03]
     assert np.ptp(np.rad2deg(pill.theta[0])) == pytest.approx(20.0, abs=0.05)
     moved = pill.corner[0, -1, 0] - pill.corner[0, 0, 0]  # the contact rolls on as far as the arc of the cap is long
     assert np.linalg.norm(moved[:2]) == pytest.approx(0.03 * np.ptp(pill.theta[0]), rel=1e-3)
@@ -227,7 +227,7 @@ def test_slip_is_counted_from_rolling(pill: Run) -> None:
 def test_rolls(text: str, contact: object, keys: dict, tmp_path: Path) -> None:
     run = simulate(own(tmp_path, text, contact, **keys))
     rolls(run)
-    assert run.radius[0] in (0.03, 0.012)
+    assert run.world.radius[0] in (0.03, 0.012)
     assert (np.abs(run.rolled).max() > 1e-3) == ("about" not in keys)
 
 

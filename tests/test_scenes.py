@@ -8,7 +8,7 @@ import pytest
 from pivoting.controller.plane_and_space import space
 from pivoting.models import ModelError, corner, load, place, read_body, scene_path
 from pivoting.sim import SCENARIOS
-from pivoting.sim.placement import planned
+from pivoting.sim.placement import placed
 
 
 @pytest.mark.parametrize("name", sorted(SCENARIOS))
@@ -19,7 +19,7 @@ def test_each_opens_on_its_own_standing_on_its_contact(name: str) -> None:
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.keyframe("start").id)
     mujoco.mj_kinematics(model, data)
-    plan = planned(case, model)
+    plan = placed(case, model)
     normal = data.geom("table").xmat.reshape(3, 3)[:, 2]
     heights = (data.xpos[1] + plan.contacts @ data.xmat[1].reshape(3, 3).T) @ normal
     np.testing.assert_allclose(heights, 0.0, atol=1e-8)

@@ -60,8 +60,8 @@ def test_what_it_touches_at_the_start_is_refused(tmp_path: Path) -> None:
 def test_depth_that_the_contact_explains_is_no_matter(tmp_path: Path) -> None:
     """A contact so soft that the box sinks in by 1 mm under its weight: explained; the slip is another matter."""
     run = pivoted(tmp_path, mjcf(BOX.replace("/>", f" {SOFT}/>"), extra=""), chosen=False)
-    assert run.contacts.depth.max() > 5e-4
-    assert run.measures.penetration_rel[0] * run.size < 0.5 * run.contacts.depth.max()
+    assert run.log.contacts.depth.max() > 5e-4
+    assert run.measures.penetration_rel[0] * run.size < 0.5 * run.log.contacts.depth.max()
 
 
 def test_depth_beyond_that_fails(tmp_path: Path) -> None:

@@ -8,9 +8,9 @@ from typing import Any
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.controller.solution import FAILED
 from pivoting.controller.solution_space import SolutionSpace, solution_space
 from pivoting.sim.drawing.shapes import Solid, body_solids
-from pivoting.sim.pipeline.control import FAILED
 from pivoting.sim.run import Run
 
 Array = NDArray[np.float64]

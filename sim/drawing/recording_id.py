@@ -14,7 +14,7 @@ def digest(run: "Run") -> str:
     """Twelve hexadecimal digits; the same for equal runs on any day, whatever was measured in them."""
     model = np.zeros(mujoco.mj_sizeModel(run.model), np.uint8)
     mujoco.mj_saveModel(run.model, None, model)
-    given = (model, run.points, run.radius, run.turn, run.reference, run.attached.controller.belief)
+    given = (model, run.points, run.world.radius, run.world.turn, run.reference, run.attached.controller.belief)
     case = run.scenario.absolute(run.load)
     words = (case.bounds(), case.limits, case.plan_hz, case.plan_steps, case.plan_step, case.integrator, case.track)
     out = hashlib.blake2b(digest_size=6)

@@ -23,14 +23,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pivoting.controller.solution import STATUS
+from pivoting.controller.solution import BOUNDED, FAILED, INACCURATE, STATUS
 from pivoting.controller.solution_space import SolutionSpace
 from pivoting.controller.validate import fail
 from pivoting.sim.drawing.recorded_world import PLOTS, SCENE, UP, Array, Colour, Film, Rows, usual, xyzw
 from pivoting.sim.drawing.recording_id import digest
 from pivoting.sim.drawing.shapes import arcs, cone
 from pivoting.sim.judging.measures import predicted_slip
-from pivoting.sim.pipeline.control import BOUNDED, FAILED, INACCURATE
 from pivoting.sim.run import Run
 
 OFF = ("off", "false", "0")  # of RERUN, as rerun reads it
@@ -213,7 +212,7 @@ def _contacts(film: Film) -> None:
         film.still(f"{entity}/predicted", rr.Arrows3D.from_fields(origins=[[0.0, -8.0 / 3.0 * thick, 0.0]]))
         floor, mu_planned = film.scale * contact.f_min, float(film.planned_mu[i])
         aside = 0.35 if plane else 0.2
-        for name, mu, colour, at in (("world", run.mu_world, GREY, -aside), ("planned", mu_planned, PURPLE, aside)):
+        for name, mu, colour, at in (("world", run.world.mu, GREY, -aside), ("planned", mu_planned, PURPLE, aside)):
             low, high = floor * (name == "planned"), max(tall * side / np.hypot(mu, 1.0), 1.3 * floor)
             vertices, triangles, lines = cone(mu, low, high, film.dim)
             film.still(f"{entity}/cone/{name}", rr.LineStrips3D(lines, colors=[colour], radii=thin))
@@ -286,7 +285,7 @@ def _series(film: Film) -> dict[str, tuple[Colour, float, Array]]:
         out[f"wrench/{name}"] = (colour, FINE, values)
     for k, tag in enumerate(film.tags):
         tail, fade = f"_{tag}" * bool(tag), 1.0 - 0.7 * k / len(film.tags)
-        planned = np.full(N, film.planned_mu[k] / run.mu_world)
+        planned = np.full(N, film.planned_mu[k] / run.world.mu)
         for name, colour, width, values in (
             ("slip/measured", RED, WIDE, along(slips[0][:, k])),
             ("slip/predicted", WHITE, FINE, along(slips[1][:, k])),

@@ -77,7 +77,7 @@ class _Case:
     @property
     def friction_found(self) -> float:
         """Greatest |f_t| / f_n of a contact that pushes."""
-        return float(np.nanmax(self.run.friction_use[self.world], initial=0.0)) * self.run.mu_world
+        return float(np.nanmax(self.run.friction_use[self.world], initial=0.0)) * self.run.world.mu
 
     @property
     def least_push(self) -> float:
@@ -118,7 +118,7 @@ def _reasons(case: _Case) -> Iterator[str]:
     if case.slid is not None and (case.failed("slip_max_m") or case.failed("friction_use_max")):
         k = case.slid
         at = f"at {run.time[k]:.3g} s ({theta[k]:.3g} deg)"
-        yield f"the contact slid {at}: |f_t| reached mu f_n, mu = {run.mu_world:.3g}"
+        yield f"the contact slid {at}: |f_t| reached mu f_n, mu = {run.world.mu:.3g}"
     elif case.failed("slip_max_m"):
         floor, slip = float(run.measures.slip_floor_m[i]), float(run.measures.slip_max_m[i])
         part = "unpredicted"
@@ -162,7 +162,7 @@ def _remedies(case: _Case) -> Iterator[Remedy]:
     if case.diverged is not None:
         yield from (Remedy({"dt": run.dt / 4.0}, "a finer time step"), softer)
         return
-    first = int((run.contacts.strays[i] > 0.0).argmax()) if run.strays else len(run.time)
+    first = int((run.log.contacts.strays[i] > 0.0).argmax()) if run.strays else len(run.time)
     if first < (len(run.time) if case.let_go is None else case.let_go):  # else it fell on what it touches
         ends = float(np.rad2deg(run.theta[i, first])) - 1.0
         if scenario.theta < ends < scenario.theta_end:
@@ -200,9 +200,9 @@ def _floors(case: _Case) -> Iterator[float]:
     K = len(run.points)
     off = np.linalg.norm(run.force_measured[i] - run.force[i], axis=-1)
     error = run.unit * float(np.quantile(np.nan_to_num(off), 0.95))
-    spare = max(run.mu_world - float(np.max(run.attached.controller.belief.mu)), 0.1 * run.mu_world)
+    spare = max(run.world.mu - float(np.max(run.attached.controller.belief.mu)), 0.1 * run.world.mu)
     some = {0.5 * case.weight / K, 2.0 * case.weight / K, 5.0 * case.weight / K}
-    rows = run.contact_rows
+    rows = run.world.contact_rows
     most = 20.0 * case.weight
     if rows is not None:
         w = run.angular_velocity[i] @ run.table_axes
@@ -210,7 +210,7 @@ def _floors(case: _Case) -> Iterator[float]:
         c_n = float(np.nanmax(np.abs(np.cross(w[:, None], np.cross(w[:, None], arm))[..., 2]), initial=0.0))
         opening = c_n * max(1.0 - 0.5 * rows.b * rows.h, 0.0) / rows.regularisation * rows.points / K
         some |= {2.0 * run.unit * opening}
-    some |= {1.5 * error * (1.0 + run.mu_world) / spare}
+    some |= {1.5 * error * (1.0 + run.world.mu) / spare}
     least = max(1.2 * run.unit * float(run.attached.controller.belief.f_min.min()), 0.05 * case.weight / K)
     yield from sorted({_up(floor) for floor in some if least < floor < most})
 
@@ -228,7 +228,7 @@ def _slower(case: _Case) -> Iterator[Remedy]:
 
 def _contact(case: _Case) -> Iterator[Remedy]:
     """Contact parameters under which the simulator itself slips less and holds on; see docs/fidelity.md."""
-    run, rows = case.run, case.run.contact_rows
+    run, rows = case.run, case.run.world.contact_rows
     if rows is None or not (case.failed("slip_max_m") or case.failed("contact_lost_s")):
         return
     if abs(rows.b * rows.h - 1.9) > 0.01 or run.model.opt.impratio < SHIPPED["impratio"]:

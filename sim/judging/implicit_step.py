@@ -14,13 +14,13 @@ from pivoting.controller.rotations import CONJUGATE, rotated
 from pivoting.models.external_forces import JointDrag
 
 if TYPE_CHECKING:
-    from pivoting.sim.run import Run
+    from pivoting.sim.slip import ContactMotion
 
 Array = NDArray[np.float64]
 IMPLICIT, FAST = (int(getattr(mujoco.mjtIntegrator, f"mjINT_{name}")) for name in ("IMPLICIT", "IMPLICITFAST"))
 
 
-def unseen(run: "Run") -> Array | None:
+def unseen(run: "ContactMotion") -> Array | None:
     """(W, N, K, 2) acceleration along the table (t, o) of what touches, beside its rows [m/s^2]; None for none."""
     body, opt = run.truth, run.model.opt
     gyroscopic = int(opt.integrator) == IMPLICIT or (int(opt.integrator) == FAST and body.dim == 3)

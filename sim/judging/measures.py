@@ -5,16 +5,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.controller.solution import STATUS
+from pivoting.controller.solution import FAILED, INACCURATE
 from pivoting.sim.judging.implicit_step import unseen
 from pivoting.sim.judging.predicted_slip import drift, why_unknown
 
 if TYPE_CHECKING:
-    from pivoting.sim.run import Run
+    from pivoting.sim.slip import ContactMotion
 
 Array = NDArray[np.float64]
 LIFTED = 1e-4  # of the lever: a contact that has risen by more has left the table
-BOUNDED = STATUS.index("bounded")
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +54,7 @@ class Measures:
 
 
 @np.errstate(invalid="ignore", divide="ignore", over="ignore")  # a world that diverges fails, without noise
-def measure(run: "Run") -> Measures:
+def measure(run: "ContactMotion") -> Measures:
     """Measure a run. Not-a-number anywhere in a world's readings ends up in its measures, and so in the verdict."""
     settled = run.time >= run.scenario.limits.settle_s - 1e-12
     error = np.rad2deg(run.angle_error[:, settled])
@@ -75,26 +74,26 @@ def measure(run: "Run") -> Measures:
         angle_error_rms_deg=_rms(error),
         angle_error_max_deg=np.abs(error).max(axis=1),
         contact_lost_s=np.count_nonzero(lost, axis=1) * run.dt,
-        undeclared_contact_s=np.count_nonzero(run.contacts.strays > 0.0, axis=1) * run.dt,
+        undeclared_contact_s=np.count_nonzero(run.log.contacts.strays > 0.0, axis=1) * run.dt,
         penetration_rel=_penetration(run) / run.size,
         contacts_missing=np.maximum(run.scenario.limits.contacts_end - run.contacts_found[:, -1], 0.0),
         bounce_m=run.unit * _bounce(run),
         friction_use_max=np.where(ever, np.where(pushed, use, 0.0).max(axis=(1, 2)), np.nan),
         force_mismatch_rel=mismatch,
         residual_max=np.where(np.isfinite(run.residual), run.residual, np.inf).max(axis=1),
-        unsolved_steps=np.count_nonzero((run.status != 0) & (run.status != BOUNDED), axis=1).astype(float),
+        unsolved_steps=np.isin(run.status, (INACCURATE, FAILED)).sum(axis=1).astype(float),
     )
 
 
-def _penetration(run: "Run") -> Array:
-    """(W,) greatest depth [m] beyond that at which the soft contact balances the predicted load."""
-    rows = run.contact_rows
-    load = run.force[..., -1].sum(axis=-1)
+def _penetration(run: "ContactMotion") -> Array:
+    """(W,) greatest depth [m] beyond that at which the soft contact balances the load."""
+    rows = run.world.contact_rows
+    load = (run.force if run.certified else run.force_measured)[..., -1].sum(axis=-1)
     explained = 0.0 if rows is None else rows.depth(np.nan_to_num(load) / rows.points)
-    return np.maximum(run.contacts.depth - explained, 0.0).max(axis=1)
+    return np.maximum(run.log.contacts.depth - explained, 0.0).max(axis=1)
 
 
-def _bounce(run: "Run") -> Array:
+def _bounce(run: "ContactMotion") -> Array:
     """(W,) greatest clearance [m] of the landed face; 0 where nothing is to land, or has landed."""
     if not run.scenario.limits.contacts_end:
         return np.zeros(run.worlds)
@@ -102,26 +101,28 @@ def _bounce(run: "Run") -> Array:
     return np.where(after, run.clearance[:, 1:], 0.0).max(axis=1)
 
 
-def predicted_slip(run: "Run") -> Array:
+def predicted_slip(run: "ContactMotion") -> Array:
     """(W, N+1, K, 2) the displacement [m] of each point along the table that MuJoCo's contact model itself predicts.
 
     Not-a-number from where it cannot.
     """
-    if run.contact_rows is None:
+    if run.world.contact_rows is None:
         return np.full(run.slip.shape, np.nan)
     point, omega = run.stepped[..., None, :], run.angular_velocity @ run.table_axes
     turning, touching = run.turning - point, run.lever - point
-    return drift(run.contact_rows, run.held, turning, touching, run.stepped_velocity, omega, unseen(run), _settle(run))
+    return drift(
+        run.world.contact_rows, run.log.held, turning, touching, run.stepped_velocity, omega, unseen(run), _settle(run)
+    )
 
 
-def slip_floor_unknown(run: "Run") -> str:
+def slip_floor_unknown(run: "ContactMotion") -> str:
     """Why that cannot be predicted, in the first world where it cannot; "" where it can in all."""
-    found = why_unknown(run.contact_rows, run.held, run.time, _settle(run))
+    found = why_unknown(run.world.contact_rows, run.log.held, run.time, _settle(run))
     told = [f"{why}{f' in world {world}' * (run.worlds > 1)}" for world, why in enumerate(found) if why]
     return told[0] if told else ""
 
 
-def _settle(run: "Run") -> int:
+def _settle(run: "ContactMotion") -> int:
     """Steps that the start may take."""
     return int(np.count_nonzero(run.time[:-1] < run.scenario.limits.settle_s - 1e-12))
 

@@ -41,7 +41,7 @@ def stray_words(run: "Run") -> list[str]:
 
     The applied wrenches lead to the same states bit for bit, so that MuJoCo's own list of contacts can be read.
     """
-    strays = run.contacts.strays > 0.0
+    strays = run.log.contacts.strays > 0.0
     if not strays.any():
         return []
     world = int(strays.sum(axis=1).argmax())
@@ -53,10 +53,10 @@ def stray_words(run: "Run") -> list[str]:
         data.xfrc_applied[body] = run.wrench_world[world, step]
         if strays[world, step]:
             mujoco.mj_forward(run.model, data)
-            at = run.declared.touch(run.position[world, step], run.quaternion[world, step])
+            at = run.world.declared.touch(run.position[world, step], run.quaternion[world, step])
             for own, other, contact in forced(run.model, data, body):
-                _, away = run.declared.share(np.array(contact.pos), at)
-                if other != run.truth.support or (away > run.declared.near and not run.declared.landing):
+                _, away = run.world.declared.share(np.array(contact.pos), at)
+                if other != run.truth.support or (away > run.world.declared.near and not run.world.declared.landing):
                     found.setdefault((own, other), float(run.time[step]))
         mujoco.mj_step(run.model, data)
     return [

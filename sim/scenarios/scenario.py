@@ -190,6 +190,11 @@ class Scenario:
         """Name and changes, in the words of the command line."""
         return " ".join([self.name, *(f"{key}={value}" for key, value in self.changes.items())])
 
+    @property
+    def stages(self) -> dict[str, float]:
+        """The values of the keys that ask for a stage, by the place of its class."""
+        return {}
+
     def control_law(self) -> Law:
         """The law; the quasi-dynamic ones take the time constant of `bandwidth` as their step h."""
         if self.law == "static":

@@ -1,0 +1,141 @@
+"""The compiled step: of every world the problem is stated, solved within bounds and certified; the wrench is turned."""
+
+from typing import NamedTuple
+
+import numpy as np
+from pivoting.controller.contacts import fill_jacobian
+from pivoting.controller.control_laws import fill_required
+from pivoting.controller.kernels.compilation import kernel
+from pivoting.controller.kernels.interior_point import contact_wrench
+from pivoting.controller.kernels.planar_closed_form import planar_wrench
+from pivoting.controller.rotations import fill_rotation, turned
+from pivoting.controller.solution import FAILED, INACCURATE, SOLVED
+from pivoting.controller.validate import Array
+from pivoting.controller.wrench_bounds import (
+    Stacked,
+    begin_multiplier,
+    farthest_exceeded,
+    fill_heavier,
+    next_multiplier,
+    size_over,
+)
+
+ATTEMPTS, HELD = 30, 1e-10  # solves in which a bound is to be held, relative to it
+HEAVIEST = 30.0  # of the weight: a bound that needs more is left to `BoundedSolver`
+STATE = 13  # numbers of a state: position (3), quaternion (4), velocity (3), angular velocity (3), world axes
+
+
+class Belief(NamedTuple):
+    """What the compiled loop needs to know, as arrays; see `fill_jacobian` and `fill_required` for their meaning."""
+
+    points: Array
+    offsets: Array
+    frames: Array
+    pivot: Array
+    offset: Array
+    mu: Array
+    f_min: Array
+    mass: float
+    inertia: Array
+    gravity: Array
+    law: tuple[float, float, float, float]
+    Q_w: Array
+    Q_f: Array
+    wrench_map: Array
+    force_map: Array
+
+
+@kernel
+def state_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ignore[no-untyped-def]
+    """Write R (3, 3), J (nw, K d) and the required wrench b (nw,) at one state."""
+    fill_rotation(q, R)
+    fill_jacobian(R, belief.points, belief.offsets, belief.frames, belief.wrench_map, belief.force_map, J)
+    fill_required(
+        R, q, omega, q_d, omega_d, alpha_d, belief.law, belief.mass, belief.inertia, belief.gravity, belief.pivot,
+        belief.offset, belief.wrench_map, b,
+    )  # fmt: skip
+
+
+@kernel
+def step_worlds(  # type: ignore[no-untyped-def]
+    belief, bounds, own, planar, several, tolerance, states, q_d, omega_d, alpha_d, external, required, wrench, force,
+    residual, status,
+):  # fmt: skip
+    """State, solve and certify the problem of every world; answers are written into the last five arrays.
+
+    Args:
+        belief: the values of `Belief`, shared by the worlds.
+        bounds: the values of `WrenchBounds.stacked`, or None. One that is not on a rate is kept, as a heavier weight;
+            where that needs more than `HEAVIEST` times the weight, or a second bound, the answer is that without any.
+        own, planar, several: `WrenchController.workspace()`.
+        tolerance: largest relative KKT residual of status 0 (solved).
+        states: (W, 13) as measured; of each its orientation and its angular velocity count, see `STATE`.
+        q_d, omega_d, alpha_d: (W, 4), (W, 3), (W, 3), the reference now; (1, ...) is the same for all worlds.
+        external: (W, nw) or (1, nw), known wrenches on the object besides gravity, contacts and the controller's own,
+            object axes.
+        required: (W, nw) out, the right-hand side J f + w of the problem, `external` taken off, object axes.
+        wrench: (W, nw) out, in object axes; nan where the status is 2 (failed: no finite answer).
+        force: (W, K d) out, in contact axes.
+        residual: (W,) out.  status: (W,) out, int8: 0 solved, 1 inaccurate, 2 failed.
+    """
+    belief = Belief(*belief)
+    nw = belief.wrench_map.shape[0]
+    R, J, heavier, root = own
+    Q_w, Q_f, mu, f_min = belief.Q_w, belief.Q_f, belief.mu, belief.f_min  # taken out once: it shows in the plane
+    for i in range(states.shape[0]):
+        j, b = i % q_d.shape[0], required[i]
+        state_problem(belief, states[i, 3:7], states[i, 10:13], q_d[j], omega_d[j], alpha_d[j], R, J, b)
+        for row in range(nw):
+            b[row] -= external[i % external.shape[0], row]
+        ball, multiplier, Q = -1, 0.0, Q_w
+        for attempt in range(ATTEMPTS + 1):
+            if bounds is not None:
+                fill_heavier(Stacked(*bounds), ball, multiplier, Q_w, heavier)
+                Q = heavier
+            # Of what is None the compiler leaves the branch out, and all kernels that it calls.
+            if planar is not None:
+                residual[i] = planar_wrench(J, b, Q, Q_f, mu, f_min, force[i], wrench[i], planar)
+            if several is not None:
+                residual[i] = contact_wrench(J, b, Q, Q_f, mu, f_min, force[i], wrench[i], several)
+            if bounds is None:
+                break
+            if attempt == 0:
+                ball = farthest_exceeded(Stacked(*bounds), wrench[i])
+                if ball >= 0:
+                    begin_multiplier(Stacked(*bounds), ball, Q_w, root)
+            if ball < 0 or not np.isfinite(residual[i]):
+                break
+            size = size_over(Stacked(*bounds), ball, wrench[i], wrench[i], 1.0)
+            if abs(size - 1.0) <= HELD:
+                residual[i] = max(residual[i], abs(size - 1.0))
+                break
+            next_multiplier(root, size)
+            multiplier = root[0]
+            if attempt >= ATTEMPTS - 1 or not multiplier <= HEAVIEST * root[5]:  # out of reach: as without bounds
+                ball = -1
+        if not np.isfinite(residual[i]):
+            status[i] = FAILED
+            for row in range(nw):
+                wrench[i, row] = np.nan
+        else:
+            status[i] = SOLVED if residual[i] <= tolerance else INACCURATE
+
+
+@kernel
+def world_wrench(wrench_map, q, wrench, out):  # type: ignore[no-untyped-def]
+    """Turn wrenches in object axes into (force, torque) at the CoM in WORLD axes, as `xfrc_applied` wants them.
+
+    Args:
+        wrench_map: (nw, 6), see `Space`.  q: (W, 4) object to world.  wrench: (W, nw).
+        out: (W, 6), written; zero where the wrench is not finite: without an answer nothing is applied.
+    """
+    for i in range(q.shape[0]):
+        for half in (0, 3):
+            a = b = c = 0.0
+            for j in range(wrench.shape[1]):
+                a += wrench_map[j, half] * wrench[i, j]
+                b += wrench_map[j, half + 1] * wrench[i, j]
+                c += wrench_map[j, half + 2] * wrench[i, j]
+            a, b, c = turned(q[i, 0], q[i, 1], q[i, 2], q[i, 3], a, b, c)
+            finite = np.isfinite(a + b + c)
+            out[i, half], out[i, half + 1], out[i, half + 2] = (a, b, c) if finite else (0.0, 0.0, 0.0)

@@ -1,0 +1,86 @@
+"""What the controller believes of a scenario: the object, where it is placed, and the controller made for them."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+from pivoting.controller.validate import fail
+from pivoting.controller.wrench_controller import WrenchController
+from pivoting.models.friction_coefficient import read_friction
+from pivoting.models.names import body_id, geom_id
+from pivoting.models.scenes import Scene
+from pivoting.sim.attach import Attached, attach
+from pivoting.sim.pace import closing_force
+from pivoting.sim.placement import Placement, placed
+from pivoting.sim.scenarios.scenario import Scenario
+from pivoting.sim.scenarios.scenario_keys import CONTROL_KEYS
+
+
+class Belief(NamedTuple):
+    """scene: as the controller knows it.  attached: the controller on it.  placement: of the object there."""
+
+    scene: Scene
+    attached: Attached
+    placement: Placement
+
+
+def believe(case: Scenario, read: Scene, controller: WrenchController | None = None) -> Belief:
+    """What the scenario's controller, or another, believes.
+
+    Args:
+        read: the scene of the scenario's file.
+
+    Raises:
+        ModelError: the object cannot be served, or placed on its contact.
+        ValueError: a controller that is given is not for these contacts.
+    """
+    scene = read.changed(case.believed)
+    case = replace(case, body=scene.body, support=scene.support)
+    there = placed(case, scene.compiled, read.unit)
+    if case.chosen and case.mu is None:  # what the file itself says of friction holds: it may have none
+        read_friction(read.read, body_id(read.read, read.body), geom_id(read.read, read.support), there.contacts)
+    if controller is not None:
+        _check(controller, case, there)
+    floor = (case.f_min or 0.0) if controller is None else controller.belief.f_min.max()
+    if there.load.force == 0.0 and floor == 0.0:
+        raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the object on its support")
+    if controller is not None:
+        return Belief(scene, Attached(scene.compiled, there.body, controller), there)
+    attached = attach(
+        scene.compiled,
+        body=case.body,
+        contacts=list(there.contacts),
+        radius=there.radius,
+        law=case.control_law(),
+        mu=case.mu,
+        margin=case.margin,
+        f_min=_floor(case.absolute(there.load), there) / read.unit,
+        Q_w=case.wrench_weight(there.body.dim, read.unit),
+        support=case.support,
+    )
+    return Belief(scene, attached, there)
+
+
+def _floor(case: Scenario, there: Placement) -> float:
+    """Of each contact's normal force [N]."""
+    if case.f_min is not None:
+        return float(case.f_min)
+    return closing_force(there.body.mass, there.unit * there.arm, case.pace[1])
+
+
+def _check(controller: WrenchController, case: Scenario, there: Placement) -> None:
+    """Refuse a controller that is not for these contacts, or that the loop would not ask."""
+    if not isinstance(controller, WrenchController):
+        raise fail("controller", controller, "a WrenchController")
+    if [contact.dim for contact in controller.contacts] != [there.body.dim] * len(there.contacts):
+        kind = "planar" if there.body.dim == 2 else "spatial"
+        given = f"one with {len(controller.contacts)} contacts in dimension {controller.space.dim}"
+        raise fail("controller", given, f"of {len(there.contacts)} {kind} contact{'s' * (len(there.contacts) > 1)}")
+    for name in ("problem", "jacobian"):
+        if getattr(getattr(controller, name), "__func__", None) is not getattr(WrenchController, name):
+            allowed = (
+                f"without a {name}() of its own: the compiled loop states the problems of all worlds from `belief`"
+            )
+            raise fail("controller", type(controller).__name__, allowed + ", and would never call it")
+    ignored = [key for key in CONTROL_KEYS if key in case.changes]
+    if ignored:
+        raise fail(ignored[0], case.changes[ignored[0]], "left out: the controller that is given has its own")

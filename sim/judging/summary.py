@@ -1,0 +1,100 @@
+"""The run in numbers: what `summary.json` and `--json` say."""
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from pivoting.controller.solution import BOUNDED
+from pivoting.models.frames import matrix
+from pivoting.models.names import geom_name
+from pivoting.models.rigid_body import file_frame, laid_over
+from pivoting.sim.judging.advice import reasons, remedies
+from pivoting.sim.judging.measures import slip_floor_unknown
+from pivoting.sim.pipeline.plan_log import plan_figures
+
+if TYPE_CHECKING:
+    from pivoting.sim.run import Run
+
+Array = NDArray[np.float64]
+_CHOSEN = ("contacts", "coupling", "reason")  # of the contact settings, what the model itself does not say
+
+
+def summary(run: "Run") -> dict[str, Any]:
+    """The run in numbers, of the worst world, SI units in the keys; what `--json` prints."""
+    worst = {key: float(np.max(value)) for key, value in vars(run.measures).items()}
+    return {
+        "scenario": run.scenario.name,
+        "model": str(run.scenario.path),
+        "body": run.scenario.body,
+        "length_unit_m": run.unit,
+        "contacts": (run.unit * run.points).tolist(),
+        "radius": (run.unit * run.world.radius).tolist(),
+        "changes": run.scenario.changes,
+        "resolved": run.scenario.resolved(run.load),
+        "limits": asdict(run.limits),
+        "controller": run.controller,
+        "seed": run.seed,
+        "worlds": run.worlds,
+        "verdict": run.verdict,
+        "failed_worlds": run.failed_worlds.tolist(),
+        "worst_world": run.worst_world,
+        **worst,
+        "slip_floor_unknown": slip_floor_unknown(run) or None,
+        "solve_us_median": float(np.median(run.control_us)),
+        "solve_us_p99": float(np.quantile(run.control_us, 0.99)),
+        "sim_s": float(run.time[-1]),
+        "wall_s": run.wall_s,
+        "real_time_factor": run.worlds * float(run.time[-1]) / run.wall_s,
+        "bounded_steps": int(np.count_nonzero(run.status == BOUNDED)),
+        "reasons": reasons(run),
+        "remedies": [remedy.setting for remedy in remedies(run)],
+        "undeclared_contacts": run.strays,
+        "support": geom_name(run.model, run.truth.support),
+        "contact": "; ".join(",".join(f"{x:.9g}" for x in point) for point in _in_file(run)),
+        "object": object_figures(run),
+        "contact_settings": contact_figures(run),
+        "events": [event._asdict() for event in run.events],
+        "engine_warnings": list(run.engine_warnings),
+        **({} if run.plans is None else plan_figures(run.plans)),
+        **({} if run.plan is None else {"plan_angle_error_max_deg": float(np.rad2deg(run.plan_error.max()))}),
+    }
+
+
+def _in_file(run: "Run") -> Array:
+    """(K, 3) the contacts as --contact takes them, in the frame and unit of length that the file gives the body."""
+    origin, axes = file_frame(run.model, run.truth.index)
+    return (run.truth.com + run.points @ matrix(run.truth.axes).T - origin) @ axes
+
+
+def object_figures(run: "Run") -> dict[str, Any]:
+    """What was read of the object, as the world has it, in the frame that its file gives the body."""
+    origin, axes = file_frame(run.model, run.truth.index)
+    return {
+        "support": geom_name(run.model, run.truth.support),
+        "mass_kg": run.truth.mass,
+        "inertia_kg_m2": (run.unit**2 * np.asarray(run.truth.inertia)).tolist(),
+        "com_m": (run.unit * (run.truth.com - origin) @ axes).tolist(),
+        "mu": run.world.mu,
+        "contacts_m": (run.unit * _in_file(run)).tolist(),
+        "radius_m": (run.unit * run.world.radius).tolist(),
+        "damping": 0.0 if run.truth.drag is None else float(run.truth.drag.damping.max()),
+        "frictionloss": 0.0 if run.truth.drag is None else float(run.truth.drag.friction.max()),
+        "laid_over_deg": laid_over(run.model, run.truth, run.world.turn[1]),
+    }
+
+
+def contact_figures(run: "Run") -> dict[str, Any]:
+    """The support's contact parameters in the world, and what they replaced of the file."""
+    opt, geom = run.model.opt, run.truth.support
+    return {
+        "dt_s": float(opt.timestep),
+        "solref": run.model.geom_solref[geom].tolist(),
+        "solimp": run.model.geom_solimp[geom].tolist(),
+        "impratio": float(opt.impratio),
+        "cone": mujoco.mjtCone(int(opt.cone)).name.removeprefix("mjCONE_").lower(),
+        "replaced": dict(run.world.replaced),
+        "f_min_N": run.unit * float(run.attached.controller.belief.f_min.max()),
+        **({} if run.world.settings is None else {key: getattr(run.world.settings, key) for key in _CHOSEN}),
+    }

@@ -1,0 +1,30 @@
+"""The wrench as MuJoCo takes it: turned into world axes and written to `xfrc_applied` of the object."""
+
+import numpy as np
+from mujoco.batch import Batch
+from numpy.typing import NDArray
+from pivoting.controller.kernels.compiled_step import world_wrench
+from pivoting.sim.pipeline.stages import States
+
+Array = NDArray[np.float64]
+
+
+class FreeWrench:
+    """A wrench that acts on the object from nowhere, fixed to its axes, at its centre of mass.
+
+    Args:
+        wrench_map: (nw, 6), see `Space`.
+        body: id of the object.
+    """
+
+    def __init__(self, batch: Batch, wrench_map: Array, body: int):
+        self._map, self._xfrc = wrench_map, batch.bind("xfrc_applied")[:, body]
+
+    def __call__(self, states: States, wrench: Array, out: Array) -> None:
+        """Apply wrenches (W, nw), object axes; zero where there is no answer.
+
+        Args:
+            out: (W, 6), written: what is applied, force and torque at the centre of mass, world axes.
+        """
+        world_wrench(self._map, states.orientation, wrench, out)
+        self._xfrc[:] = out

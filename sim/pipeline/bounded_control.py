@@ -1,0 +1,61 @@
+"""A control within bounds: what exceeds them is solved for again."""
+
+import numpy as np
+from numpy.typing import NDArray
+from pivoting.controller.bounded_solver import BoundedSolver
+from pivoting.controller.conic_program import USABLE
+from pivoting.controller.solution import BOUNDED, FAILED, INACCURATE
+from pivoting.controller.wrench_bounds import WrenchBounds, fill_excess
+from pivoting.controller.wrench_controller import WrenchController
+from pivoting.sim.pipeline.stages import Answers, Control, States
+
+Array = NDArray[np.float64]
+OVER = 1e-9  # of a bound: a wrench that exceeds it by more is solved for again, within bounds
+BETTER_THAN_NONE = 1e-3  # relative KKT residual within bounds
+
+
+class BoundedControl:
+    """Another control within bounds: a wrench that still exceeds one is solved for again, see `BoundedSolver`.
+
+    Args:
+        dt: time step [s].
+
+    Attributes:
+        inner: the other control.
+    """
+
+    def __init__(self, inner: Control, controller: WrenchController, bounds: WrenchBounds, dt: float):
+        self.inner, self._dt = inner, dt
+        self._bounds = bounds.stacked(len(controller.Q_w))
+        self._rated = bounds.rated
+        self._solve = BoundedSolver(controller, bounds, dt)
+
+    def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
+        self.inner(k, states, before, out)
+        last = applied(before) if self._rated else None
+        excess = np.empty(len(out.wrench))
+        most = fill_excess(self._bounds, out.wrench, out.wrench if last is None else last, self._dt, excess)
+        if not most > OVER:
+            return
+        for i in np.flatnonzero(excess > OVER):
+            answer = self._solve(states.orientation[i], out.required[i], None if last is None else last[i])
+            if not answer.residual <= BETTER_THAN_NONE:
+                out.wrench[i], out.status[i] = np.nan, FAILED
+                continue
+            out.wrench[i], out.force[i], out.residual[i] = answer.wrench, answer.force.ravel(), answer.residual
+            if answer.residual > USABLE:
+                out.status[i] = INACCURATE
+            elif not answer.exact:
+                out.status[i] = BOUNDED
+
+    def prepare(self, states: States, out: Answers) -> None:
+        """Compile, and set the solver up."""
+        self.inner.prepare(states, out)
+        fill_excess(self._bounds, out.wrench, out.wrench, self._dt, np.empty(len(out.wrench)))
+        for _ in range(2):  # set up, then in place
+            self._solve(states.orientation[0], out.required[0])
+
+
+def applied(wrench: Array | None) -> Array | None:
+    """Wrenches (W, nw) as they were applied: none where there was no answer."""
+    return None if wrench is None else np.where(np.isfinite(wrench), wrench, 0.0)

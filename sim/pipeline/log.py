@@ -1,0 +1,83 @@
+"""What is kept of a run: the output of every stage at every step."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pivoting.controller.kernels.compiled_step import STATE
+from pivoting.sim.contact_sensing import ContactReadings
+from pivoting.sim.judging.predicted_slip import Held
+from pivoting.sim.pipeline.stages import Answers
+
+Array = NDArray[np.float64]
+
+
+class Log(NamedTuple):
+    """The output of every stage, W worlds and N steps; read-only once the run is over.
+
+    While the steps are made, and as `empty_log` makes them, the arrays have (step, world) first; `worlds_first` turns
+    that round.
+
+    Attributes:
+        states: (W, N+1, 13) true states, with the columns of `stages.States`.
+        measured, estimated: (W, N, 13) likewise, by sensing and by the observer; None where they change nothing.
+        answers: `Answers`, (W, N, ...).
+        acting: (W, N, nw) wrenches that act, object axes; None where the actuators change nothing.
+        wrench_world: (W, N, 6) the same as force and torque at the centre of mass, world axes.
+        contacts, held: `ContactReadings` and `Held`, (W, N, ...).
+        control_ns: (N,) for all worlds together.
+    """
+
+    states: Array
+    measured: Array | None
+    estimated: Array | None
+    answers: Answers
+    acting: Array | None
+    wrench_world: Array
+    contacts: ContactReadings
+    held: Held
+    control_ns: Array
+
+
+def empty_log(
+    steps: int, worlds: int, widths: tuple[int, int], contacts: tuple[ContactReadings, Held], stages: Any
+) -> Log:
+    """The log of a run that begins.
+
+    Args:
+        widths: nw and K d.  contacts: where the contacts are kept.  stages: `Stages`, for what they change is kept.
+    """
+    nw, n = widths
+    both = (steps, worlds)
+    answers = Answers(
+        np.empty((*both, nw)), np.empty((*both, nw)), np.empty((*both, n)), np.empty(both), np.empty(both, np.int8)
+    )
+    return Log(
+        states=np.empty((steps + 1, worlds, STATE)),
+        measured=np.empty((*both, STATE)) if stages.sense else None,
+        estimated=np.empty((*both, STATE)) if stages.observe else None,
+        answers=answers,
+        acting=np.empty((*both, nw)) if stages.actuate else None,
+        wrench_world=np.empty((*both, 6)),
+        contacts=contacts[0],
+        held=contacts[1],
+        control_ns=np.empty(steps),
+    )
+
+
+def worlds_first(log: Log) -> Log:
+    """With (world, step) first, read-only."""
+    log.control_ns.flags.writeable = False
+    turned = {name: _turned(values) for name, values in log._asdict().items() if name != "control_ns"}
+    return log._replace(**turned)
+
+
+def _turned(values: Any) -> Any:
+    """(step, world, ...) as the read-only view (world, step, ...), also of all arrays of a named tuple."""
+    if values is None:
+        return None
+    if isinstance(values, tuple):
+        return type(values)(*map(_turned, values))
+    out = np.moveaxis(values, 1, 0)
+    out.flags.writeable = False
+    return out

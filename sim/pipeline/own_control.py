@@ -1,0 +1,62 @@
+"""A control of the user's own: a function of the estimated states and the reference that gives the wrench."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pivoting.controller.solution import FAILED, UNCERTIFIED
+from pivoting.controller.validate import fail
+from pivoting.sim.pipeline.stages import Answers, Desired, States
+
+Array = NDArray[np.float64]
+
+
+class Moment(NamedTuple):
+    """What a control of one's own is told at a step.
+
+    Attributes:
+        time: [s].
+        states: of W worlds, as measured and estimated.
+        desired: where the object is to be now; the same for all worlds, (1, ...).
+        before: (W, nw) the wrenches that it gave at the step before, None at first.
+    """
+
+    time: float
+    states: States
+    desired: Desired
+    before: Array | None
+
+
+OwnControlFunction = Callable[[Moment], ArrayLike]  # gives (W, nw) or (nw,) wrenches, object axes [N, N m]
+
+
+class OwnControl:
+    """Asks the function at every step. Its wrenches are applied as they are, and carry no certificate.
+
+    Args:
+        desired: (N+1, 4), (N+1, 3), (N+1, 3), the reference at every step.
+        dt: time step [s].
+    """
+
+    def __init__(self, function: OwnControlFunction, desired: tuple[Array, Array, Array], dt: float):
+        if not callable(function):
+            raise fail("control", function, "a function of a Moment that gives the wrench")
+        self._function, self._dt = function, dt
+        self._desired = [values[:, None] for values in desired]
+
+    def prepare(self, states: States, out: Answers) -> None:
+        """Nothing has to be done; the function is not asked before its time."""
+        out.wrench[:] = 0.0
+
+    def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
+        now = Moment(k * self._dt, states, Desired(*(values[k] for values in self._desired)), before)
+        given = np.asarray(self._function(now))
+        W, nw = out.wrench.shape
+        if given.dtype.kind not in "iuf" or given.shape not in ((W, nw), (nw,)):
+            what = f"{given.dtype} of shape {given.shape}"
+            raise fail("control", what, f"a function that gives numbers of shape {(W, nw)} or {(nw,)}: wrenches")
+        out.wrench[:] = given
+        for values in (out.required, out.force, out.residual):
+            values[:] = np.nan
+        out.status[:] = np.where(np.isfinite(out.wrench).all(axis=1), UNCERTIFIED, FAILED)

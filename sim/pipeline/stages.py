@@ -1,0 +1,177 @@
+"""The stages of a step and what passes between them: sense, observe, control, actuate; one protocol each.
+
+    states -> sense -> observe -> control -> actuate -> plant
+
+All stages work on W worlds at once. A stage that is left out costs nothing. Stages may have state, which `prepare` and
+the order of the steps determine; random draws are keyed (see `random_draws`), so that a replayed world is the same.
+"""
+
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from pivoting.controller.kernels.compiled_step import STATE
+
+Array = NDArray[np.float64]
+# The columns of a state's values.
+POSITION, ORIENTATION, VELOCITY, ANGULAR_VELOCITY = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13)
+
+
+class States:
+    """The states of W worlds at one time.
+
+    Attributes:
+        values: (W, 13) position, orientation, velocity and angular velocity, in this order, as the properties say.
+        joint_position: (W, nq) and joint_velocity: (W, nv) of all joints of the model.
+    """
+
+    __slots__ = ("joint_position", "joint_velocity", "values")
+
+    def __init__(self, values: Array, joint_position: Array, joint_velocity: Array):
+        self.values, self.joint_position, self.joint_velocity = values, joint_position, joint_velocity
+
+    @property
+    def position(self) -> Array:
+        """(W, 3) of the centre of mass, world axes [m]."""
+        return self.values[:, POSITION]
+
+    @property
+    def orientation(self) -> Array:
+        """(W, 4) quaternions, object axes to world."""
+        return self.values[:, ORIENTATION]
+
+    @property
+    def velocity(self) -> Array:
+        """(W, 3) of the centre of mass, world axes [m/s]."""
+        return self.values[:, VELOCITY]
+
+    @property
+    def angular_velocity(self) -> Array:
+        """(W, 3) world axes [rad/s]."""
+        return self.values[:, ANGULAR_VELOCITY]
+
+    def changed(self, values: Array) -> "States":
+        """The same joints with other values (W, 13) of the object, as something measures or estimates it."""
+        return States(values, self.joint_position, self.joint_velocity)
+
+    @classmethod
+    def turning(cls, orientation: Array, angular_velocity: Array) -> "States":
+        """States of which only the rotation matters: orientations (W, 4) and angular velocities (W, 3)."""
+        values = np.zeros((len(orientation), STATE))
+        values[:, ORIENTATION], values[:, ANGULAR_VELOCITY] = orientation, angular_velocity
+        return cls(values, np.zeros((len(values), 0)), np.zeros((len(values), 0)))
+
+
+class Answers(NamedTuple):
+    """Where a control writes its answers to one step.
+
+    Attributes:
+        required: (W, nw) what the contact forces and the wrench have to make together, object axes [N, N m].
+        wrench: (W, nw) that is to be applied, object axes; nan where there is no answer.
+        force: (W, K d) contact forces that go with it, contact axes [N].
+        residual: (W,) relative KKT residuals.  status: (W,) codes of `solution.STATUS`.
+    """
+
+    required: Array
+    wrench: Array
+    force: Array
+    residual: Array
+    status: NDArray[np.int8]
+
+
+class Desired(NamedTuple):
+    """Where the object is to be: orientation (W or 1, 4), angular velocity and acceleration (W or 1, 3), world axes."""
+
+    orientation: Array
+    angular_velocity: Array
+    angular_acceleration: Array
+
+
+class Sense(Protocol):
+    """What is measured."""
+
+    def __call__(self, k: int, states: States) -> States:
+        """What is measured of the true states at the start of step k."""
+        ...
+
+
+class Observe(Protocol):
+    """What is made of the measurements."""
+
+    def __call__(self, k: int, measured: States, applied: Array | None) -> States:
+        """The estimated states at the start of step k; `applied`: (W, nw) wrenches of step k - 1, None at first."""
+        ...
+
+
+class Correct(Protocol):
+    """What is added to the reference before the law sees it, such as integral action."""
+
+    def __call__(self, states: States, desired: Desired) -> Desired:
+        """The corrected reference at the estimated states of a step."""
+        ...
+
+
+class Control(Protocol):
+    """What decides on the wrench."""
+
+    def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
+        """Write the answers to step k; `before`: (W, nw) wrenches asked for at step k - 1, None at first."""
+        ...
+
+    def prepare(self, states: States, out: Answers) -> None:
+        """Do once what takes long, such as compiling; what is written does not count."""
+        ...
+
+
+class Actuate(Protocol):
+    """What the actuators make of the wrench that is asked for."""
+
+    def __call__(self, k: int, wrench: Array) -> Array:
+        """(W, nw) wrenches that act during step k, object axes, of those asked for."""
+        ...
+
+
+class Setting(NamedTuple):
+    """What a stage is built from, beside the value of its key.
+
+    Attributes:
+        seed, worlds, first_world: of the run; world i of a run is number first_world + i.
+        dt: time step [s].
+        axes: (A, 3) world axes about which the object can turn: the plane's normal, or three.
+        law, bandwidth [rad/s], damping: of the controller's law, as the scenario has them.
+    """
+
+    seed: int
+    worlds: int
+    first_world: int
+    dt: float
+    axes: Array
+    law: str
+    bandwidth: float
+    damping: float
+
+
+class Stages(NamedTuple):
+    """The stages around a control, in their order; where there is none the values pass unchanged."""
+
+    sense: tuple[Sense, ...] = ()
+    observe: tuple[Observe, ...] = ()
+    correct: tuple[Correct, ...] = ()
+    actuate: tuple[Actuate, ...] = ()
+
+
+def build_stages(values: Mapping[str, float], setting: Setting) -> Stages:
+    """The stages that a scenario's keys ask for.
+
+    Args:
+        values: by the place of a stage's class, "module:Class"; a value of 0 asks for none.
+    """
+    built: dict[str, list[Any]] = {slot: [] for slot in Stages._fields}
+    for place, value in values.items():
+        if value:
+            module, _, name = place.partition(":")
+            made = getattr(import_module(module), name)(value, setting)
+            built[made.slot].append(made)
+    return Stages(**{slot: tuple(stages) for slot, stages in built.items()})

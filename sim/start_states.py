@@ -1,0 +1,66 @@
+"""How the worlds start: the object on its contact, as deep in it as its load makes it, a little off the reference."""
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+from numpy.typing import NDArray
+from pivoting.controller.kernels.compilation import first_calls
+from pivoting.controller.rotations import exponential, quaternion_product
+from pivoting.models.frames import matrix
+from pivoting.models.rigid_body import initial_data, place, turn
+from pivoting.sim.attach import Attached
+from pivoting.sim.judging.undeclared_contacts import contact_margin, refuse_strays
+from pivoting.sim.pipeline.law_control import LawControl
+from pivoting.sim.pipeline.stages import Answers, States
+from pivoting.sim.world import World
+
+Array = NDArray[np.float64]
+Samples = tuple[Array, Array, Array]  # orientations, angular velocities and accelerations
+START_DEPTH = 1e-6  # of the lever from contact to CoM: how deep it starts if its load does not say
+DEEPEST = 1e-2  # likewise: how deep it may start
+
+
+def resting_depth(world: World, attached: Attached, law: LawControl, told: Samples) -> float:
+    """How deep [m] the contacts are under the load with which the law begins; 0 if MuJoCo's rows do not say."""
+    if world.contact_rows is None:
+        return 0.0
+    controller = attached.controller
+    states = States.turning(told[0][:1], told[1][:1])
+    nw, d, K = len(controller.Q_w), controller.space.dim, len(controller.contacts)
+    out = Answers(np.empty((1, nw)), np.empty((1, nw)), np.empty((1, K * d)), np.empty(1), np.empty(1, np.int8))
+    with first_calls():
+        law.prepare(states, out)
+    load = float(out.force.reshape(K, d)[:, -1].sum())
+    return float(world.contact_rows.depth(np.array(load / world.contact_rows.points)))
+
+
+def start_worlds(batch: Batch, world: World, desired: Samples, errors: Array, depth: float) -> None:
+    """Put every world on its contact, off the reference by `errors` (W,) [rad].
+
+    Everything else is where the model's first keyframe, or else qpos0, has it.
+
+    Args:
+        desired: at every step.
+        depth: at which it rests under its load, 0 if that is not known [m]; one that has less to carry at first would
+            slide, and one that has more is thrown up.
+
+    Raises:
+        ModelError: the object would touch something else there; it is named.
+    """
+    model, there, body = world.model, world.placement, world.truth
+    data, up, point = initial_data(model), matrix(body.table)[:, 2], there.contacts[0]
+    depth = min(depth or START_DEPTH * there.lever, DEEPEST * there.lever)
+    kind, floats = int(mujoco.mjtState.mjSTATE_INTEGRATION), 0.0
+    state = np.empty(mujoco.mj_stateSize(model, kind))
+    for row, error in zip(batch.state, errors, strict=True):
+        for _ in range(2):  # a contact with a margin holds the body above the table: how far, only MuJoCo knows
+            at = there.at + (there.radius[0] + floats - depth) * up
+            place(model, data, body, quaternion_product(exponential(error * there.axis), desired[0][0]), point, at)
+            touching = point - there.radius[0] * up @ data.xmat[body.index].reshape(3, 3)
+            turn(model, data, body, desired[1][0], touching)
+            mujoco.mj_forward(model, data)
+            if floats or not (floats := contact_margin(model, data, body)):
+                break
+        refuse_strays(model, data, body, world.unit)
+        mujoco.mj_getState(model, data, state, kind)
+        row[:] = state

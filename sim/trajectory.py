@@ -1,0 +1,212 @@
+"""A finished run as arrays: what every stage gave at every step, and how the object moved."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from pivoting.controller.plane_and_space import Space, space
+from pivoting.controller.planning.sequential_convex import Plan
+from pivoting.controller.rotations import CONJUGATE, quaternion_product, rotated
+from pivoting.models.frames import matrix
+from pivoting.models.rigid_body import RigidBody
+from pivoting.sim.attach import Attached
+from pivoting.sim.pipeline.log import Log
+from pivoting.sim.pipeline.plan_log import Event, PlanLog
+from pivoting.sim.pipeline.stages import ANGULAR_VELOCITY, ORIENTATION, POSITION, VELOCITY
+from pivoting.sim.scenarios.relative_values import Load
+from pivoting.sim.scenarios.scenario import Scenario
+from pivoting.sim.world import World
+
+Array = NDArray[np.float64]
+OWN_CONTROL = "own control"
+
+
+def frozen(values: Array) -> Array:
+    """What is measured cannot be changed before it is judged."""
+    values.flags.writeable = False
+    return values
+
+
+def _freeze(values: Any) -> None:
+    if isinstance(values, np.ndarray):
+        values.flags.writeable = False
+    elif isinstance(values, tuple):
+        for value in values:
+            _freeze(value)
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A closed-loop run, W worlds and N steps. States have N + 1 entries, answers N; all read-only.
+
+    Attributes:
+        scenario: what was run, overrides included.
+        seed: of what differs between the worlds.  first_world: number of the first of them.
+        attached: the controller and what it believes.
+        load: what the scenario's relative values are relative to.
+        world: what was simulated.
+        start: qpos (W, nq) and qvel (W, nv) of the worlds at time 0, from which the applied wrenches replay the run.
+        time: (N+1,) [s].
+        reference: desired angle, rate and acceleration, each (N+1,) [rad, s].
+        desired: the same as orientations (N+1, 4), angular velocities and accelerations (N+1, 3), world axes.
+        log: the output of every stage.
+        wall_s: of the loop.
+        plan: that was played in open loop, else None.
+        plans: of a receding horizon, what came of each; else None.  events: what a user has to know of.
+        engine_warnings: what MuJoCo warned of, as of a world that diverges: each once, with its first time.
+        controller: "scenario" for the scenario's own, "given" for another that was handed to `simulate`, "own control"
+            for a function of the user's own.
+    """
+
+    scenario: Scenario
+    seed: int
+    first_world: int
+    attached: Attached
+    load: Load
+    world: World
+    start: tuple[Array, Array]
+    time: Array
+    reference: tuple[Array, Array, Array]
+    desired: tuple[Array, Array, Array]
+    log: Log
+    wall_s: float
+    plan: Plan | None
+    plans: PlanLog | None
+    events: tuple[Event, ...]
+    engine_warnings: tuple[str, ...]
+    controller: str
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """From pickle, which forgets that arrays are read-only."""
+        vars(self).update(state)
+        _freeze(tuple(state.values()))
+
+    @property
+    def certified(self) -> bool:
+        """Whether every answer carries a certificate and a prediction of the contact forces."""
+        return self.controller != OWN_CONTROL
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The world's, with the sensors of the loop."""
+        return self.world.model
+
+    @property
+    def truth(self) -> RigidBody:
+        """The object as the world has it."""
+        return self.world.truth
+
+    @property
+    def unit(self) -> float:
+        """Of the model's lengths [m], and with it of all lengths, forces and moments of a run."""
+        return self.world.unit
+
+    @property
+    def worlds(self) -> int:
+        """W."""
+        return self.log.states.shape[0]
+
+    @property
+    def dt(self) -> float:
+        """Time step [s]."""
+        return float(self.time[1] - self.time[0])
+
+    @property
+    def position(self) -> Array:
+        """(W, N+1, 3) centre of mass, world axes [m]."""
+        return self.log.states[..., POSITION]
+
+    @property
+    def quaternion(self) -> Array:
+        """(W, N+1, 4) object axes to world."""
+        return self.log.states[..., ORIENTATION]
+
+    @property
+    def velocity(self) -> Array:
+        """(W, N+1, 3) of the centre of mass, world axes [m/s]."""
+        return self.log.states[..., VELOCITY]
+
+    @property
+    def angular_velocity(self) -> Array:
+        """(W, N+1, 3) world axes [rad/s]."""
+        return self.log.states[..., ANGULAR_VELOCITY]
+
+    @property
+    def required(self) -> Array:
+        """(W, N, nw) what the solved problem required, J f + w, object axes [N, N m]."""
+        return self.log.answers.required
+
+    @property
+    def wrench(self) -> Array:
+        """(W, N, 3 or 6) that was asked for, object axes, (F_u, F_v, M) in the plane [N, N m]; nan where there was no
+        answer, and then none is applied."""
+        return self.log.answers.wrench
+
+    @property
+    def wrench_world(self) -> Array:
+        """(W, N, 6) applied force and torque at the centre of mass, world axes."""
+        return self.log.wrench_world
+
+    @property
+    def force(self) -> Array:
+        """(W, N, K, d) contact forces (f_t, f_n) or (f_t, f_o, f_n) predicted by the solution, table axes [N]."""
+        values = self.log.answers.force
+        return values.reshape(*values.shape[:2], -1, self.truth.dim)
+
+    @cached_property
+    def force_measured(self) -> Array:
+        """(W, N, K, d) by MuJoCo's contacts, likewise."""
+        return frozen(self.log.contacts.force @ (self.table_axes @ self.space.force_map))
+
+    @property
+    def residual(self) -> Array:
+        """(W, N) relative KKT residuals."""
+        return self.log.answers.residual
+
+    @property
+    def status(self) -> NDArray[np.int8]:
+        """(W, N) codes of `solution.STATUS`; 0 is solved, 3 as far as the bounds allowed."""
+        return self.log.answers.status
+
+    @cached_property
+    def control_us(self) -> Array:
+        """(N,) time to sense, observe, state, solve and certify the problem of one world [microseconds]."""
+        return frozen(self.log.control_ns / (1e3 * self.worlds))
+
+    @cached_property
+    def space(self) -> Space:
+        """The plane of motion, with angles from the table that the world has, whatever the controller believes."""
+        return space(self.truth.dim, self.truth.table)
+
+    @cached_property
+    def theta(self) -> Array:
+        """(W, N+1) angle turned about the reference's axis [rad]; in the plane from the world's table."""
+        axis, start = self.world.turn
+        turned = quaternion_product(self.quaternion, start * CONJUGATE)
+        half = np.arctan2(turned[..., 1:] @ axis, turned[..., 0])
+        return frozen(np.arctan2(np.sin(2.0 * half), np.cos(2.0 * half)))
+
+    @cached_property
+    def omega(self) -> Array:
+        """(W, N+1) rate of turn about the reference's axis [rad/s]."""
+        return frozen(self.angular_velocity @ self.world.turn[0])
+
+    @cached_property
+    def angle_error(self) -> Array:
+        """(W, N+1) angle from the desired orientation [rad], with its sign about the axis."""
+        turned = quaternion_product(self.quaternion, self.desired[0] * CONJUGATE)
+        turned *= np.where(turned[..., :1] < 0.0, -1.0, 1.0)  # the shorter way round
+        size = 2.0 * np.arctan2(np.linalg.norm(turned[..., 1:], axis=-1), turned[..., 0])
+        return frozen(np.copysign(size, turned[..., 1:] @ self.world.turn[0]))
+
+    @cached_property
+    def table_axes(self) -> Array:
+        """(3, 3) the table's axes (t, o, n) as columns, world axes."""
+        return matrix(self.truth.table)
+
+    def from_com(self, points: Array) -> Array:
+        """(W, N+1, P, 3) points (P, 3) of the object, turned from object to table axes."""
+        return rotated(self.quaternion[..., None, :], points) @ self.table_axes
