@@ -8,10 +8,13 @@ import os
 import signal
 import sys
 from collections.abc import Callable
+from functools import partial
 from threading import Timer, get_ident
 from time import monotonic
 from types import FrameType
 from typing import Any, NoReturn
+
+from pivoting.compile_hooks import before_compiling
 
 
 def main() -> NoReturn:
@@ -95,7 +98,7 @@ def _command(interrupt: _Interrupt) -> Callable[[], int]:
     kept = os.dup(1)
     os.dup2(2, 1)
     try:
-        _watch_compilers(interrupt)
+        before_compiling.append(partial(_watch_compilers, interrupt))
         from pivoting.sim.console.command_line import main as command
 
         sys.stdout.flush()

@@ -8,7 +8,7 @@ from pivoting.controller.wrench_controller import WrenchController
 from pivoting.models.friction_coefficient import read_friction
 from pivoting.models.names import body_id, geom_id
 from pivoting.models.scenes import Scene
-from pivoting.sim.attach import Attached, attach
+from pivoting.sim.attachment import Attached, attach
 from pivoting.sim.pace import closing_force
 from pivoting.sim.placement import Placement, placed
 from pivoting.sim.scenarios.scenario import Scenario

@@ -8,7 +8,7 @@ from pivoting.controller.kernels.compilation import first_calls
 from pivoting.controller.rotations import exponential, quaternion_product
 from pivoting.models.frames import matrix
 from pivoting.models.rigid_body import initial_data, place, turn
-from pivoting.sim.attach import Attached
+from pivoting.sim.attachment import Attached
 from pivoting.sim.judging.undeclared_contacts import contact_margin, refuse_strays
 from pivoting.sim.pipeline.law_control import LawControl
 from pivoting.sim.pipeline.stages import Answers, States

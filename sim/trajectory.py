@@ -12,7 +12,7 @@ from pivoting.controller.planning.sequential_convex import Plan
 from pivoting.controller.rotations import CONJUGATE, quaternion_product, rotated
 from pivoting.models.frames import matrix
 from pivoting.models.rigid_body import RigidBody
-from pivoting.sim.attach import Attached
+from pivoting.sim.attachment import Attached
 from pivoting.sim.pipeline.log import Log
 from pivoting.sim.pipeline.plan_log import Event, PlanLog
 from pivoting.sim.pipeline.stages import ANGULAR_VELOCITY, ORIENTATION, POSITION, VELOCITY

@@ -160,7 +160,10 @@ def test_ids_tell_models_contacts_and_controllers_apart(tmp_path: Path) -> None:
     assert len(set(digests.values())) == len(runs), digests
     again = simulate("pivot-2d", **keys)
     assert digest(again) == digests["block"]
-    assert digest(replace(again, log=again.log._replace(control_ns=0.0 * again.control_us), wall_s=1.0)) == digests["block"]
+    assert (
+        digest(replace(again, log=again.log._replace(control_ns=0.0 * again.control_us), wall_s=1.0))
+        == digests["block"]
+    )
     assert runs["box"].scenario.label == runs["another box"].scenario.label  # which did not tell them apart
 
 

@@ -15,10 +15,17 @@ from typing import Any
 
 from numba import njit
 from numba.extending import register_jitable
-from pivoting.controller.kernels.kernel_cache import cache_folder
+from pivoting.compile_hooks import before_compiling
+from pivoting.controller.kernels.kernel_cache import cache_folder, drop_stale_kernels
 
+_controller = Path(__file__).parents[1]
+_models, _sim = _controller.with_name("models"), _controller.with_name("sim")
 CACHE = cache_folder(Path(__file__).parent)
 CACHED = CACHE is not None
+drop_stale_kernels(_controller)  # before any kernel is loaded
+drop_stale_kernels(_sim, _controller, _models)
+for announce in before_compiling:
+    announce()
 
 _common: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
 

@@ -129,7 +129,7 @@ def run(
     its natural time, sqrt(lever / gravity).
     """
     from pivoting.sim.scenarios.shipped_scenarios import scenario as find
-    from pivoting.sim.simulate import simulate
+    from pivoting.sim.simulation import simulate
 
     changes: dict[str, Any] = _pairs("--set", settings)
     if "limits" in changes:

@@ -16,7 +16,16 @@ def digest(run: "Run") -> str:
     mujoco.mj_saveModel(run.model, None, model)
     given = (model, run.points, run.world.radius, run.world.turn, run.reference, run.attached.controller.belief)
     case = run.scenario.absolute(run.load)
-    words = (case.bounds(), case.limits, case.plan_hz, case.plan_steps, case.plan_step, case.integrator, case.track, case.stages)
+    words = (
+        case.bounds(),
+        case.limits,
+        case.plan_hz,
+        case.plan_steps,
+        case.plan_step,
+        case.integrator,
+        case.track,
+        case.stages,
+    )
     out = hashlib.blake2b(digest_size=6)
     _add(out, (*given, repr(words), run.controller, run.plan is not None))
     return out.hexdigest()

@@ -1,0 +1,1 @@
+../../pivoting/__init__.pyi

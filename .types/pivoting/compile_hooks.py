@@ -1,0 +1,1 @@
+../../pivoting/compile_hooks.py

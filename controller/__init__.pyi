@@ -1,0 +1,19 @@
+from .conic import ClarabelWorkspace as ClarabelWorkspace
+from .contacts import Contact as Contact
+from .control_laws import Body as Body, Law as Law
+from .plane_and_space import Motion as Motion
+from .planning.horizon import BodyState as BodyState, Horizon as Horizon
+from .planning.receding_horizon import RecedingHorizon as RecedingHorizon
+from .planning.sequential_convex import Plan as Plan, PlanError as PlanError, Planner as Planner
+from .references import (
+    Constant as Constant,
+    MinimumJerk as MinimumJerk,
+    Reference as Reference,
+    Sampled as Sampled,
+    Sine as Sine,
+)
+from .solution import Solution as Solution, SolveError as SolveError
+from .solvers import methods as methods, pyramid_excess as pyramid_excess, solve as solve
+from .wrench_bounds import WrenchBounds as WrenchBounds
+from .wrench_controller import WrenchController as WrenchController
+from .wrench_problem import WrenchProblem as WrenchProblem, wrench_weight as wrench_weight

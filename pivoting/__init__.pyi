@@ -1,0 +1,14 @@
+from .controller.control_laws import Body as Body, Law as Law
+from .controller.contacts import Contact as Contact
+from .controller.solution import Solution as Solution
+from .controller.solvers import solve as solve
+from .controller.wrench_controller import WrenchController as WrenchController
+from .controller.wrench_problem import WrenchProblem as WrenchProblem
+from .sim.attachment import attach as attach
+from .sim.judging.assertions import assert_sticking as assert_sticking, assert_tracking as assert_tracking
+from .sim.run import Run as Run
+from .sim.scenarios.scenario import Scenario as Scenario
+from .sim.scenarios.shipped_scenarios import own_object as own_object, scenario as scenario
+from .sim.simulation import simulate as simulate
+
+__version__: str
