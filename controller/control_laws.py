@@ -92,19 +92,17 @@ class Law:
 
 
 @subroutine
-def fill_required(R, q, omega, q_d, omega_d, alpha_d, law, mass, inertia, gravity, pivot, offset, wrench_map, out):  # type: ignore[no-untyped-def]
+def fill_required(R, q, omega, q_d, omega_d, alpha_d, belief, out):  # type: ignore[no-untyped-def]
     """Write the required wrench (nw,) in object axes: what contact and applied wrench must make together.
 
     Args:
         R, q: (3, 3), (4,) orientation, object to world; omega: (3,) angular velocity, world axes [rad/s].
         q_d, omega_d, alpha_d: the reference's orientation, angular velocity and acceleration, likewise.
-        law: (feedforward, kp, kd, velocity_terms).
-        mass: [kg]; inertia: (3, 3) object axes [kg m^2]; gravity: (3,) world axes [m/s^2].
-        pivot: (3,) from the CoM to the point that stays put (the contacts' mean), or rolls, object axes [m].
-        offset: (3,) from there to where it touches (the contacts' mean), world axes [m].
-        wrench_map: (nw, 6), see `Space`.
+        belief: the object, the law and the contacts' mean, see `compiled_step.Belief`.
     """
-    feedforward, kp, kd, c = law
+    feedforward, kp, kd, c = belief.law
+    mass, inertia, gravity = belief.mass, belief.inertia, belief.gravity
+    pivot, offset, wrench_map = belief.pivot, belief.offset, belief.wrench_map
     e0, e1, e2 = rotation_error(q, q_d)
     w0, w1, w2 = into(R, omega[0], omega[1], omega[2])
     v0, v1, v2 = into(R, omega_d[0], omega_d[1], omega_d[2])

@@ -15,7 +15,7 @@ from pivoting.sim.scenarios.scenario import Scenario
 from pivoting.sim.scenarios.scenario_keys import CONTROL_KEYS
 
 
-class Belief(NamedTuple):
+class Believed(NamedTuple):
     """scene: as the controller knows it.  attached: the controller on it.  placement: of the object there."""
 
     scene: Scene
@@ -23,7 +23,7 @@ class Belief(NamedTuple):
     placement: Placement
 
 
-def believe(case: Scenario, read: Scene, controller: WrenchController | None = None) -> Belief:
+def believe(case: Scenario, read: Scene, controller: WrenchController | None = None) -> Believed:
     """What the scenario's controller, or another, believes.
 
     Args:
@@ -44,7 +44,7 @@ def believe(case: Scenario, read: Scene, controller: WrenchController | None = N
     if there.load.force == 0.0 and floor == 0.0:
         raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the object on its support")
     if controller is not None:
-        return Belief(scene, Attached(scene.compiled, there.body, controller), there)
+        return Believed(scene, Attached(scene.compiled, there.body, controller), there)
     attached = attach(
         scene.compiled,
         body=case.body,
@@ -57,7 +57,7 @@ def believe(case: Scenario, read: Scene, controller: WrenchController | None = N
         Q_w=case.wrench_weight(there.body.dim, read.unit),
         support=case.support,
     )
-    return Belief(scene, attached, there)
+    return Believed(scene, attached, there)
 
 
 def _floor(case: Scenario, there: Placement) -> float:

@@ -120,9 +120,10 @@ def sort_contacts(sensed, contacts, touching, pose, declared, rows, at, share, s
         sensed: (N, W, sensors) at the end of each step, of the contacts that it made.
         contacts, touching: first and last of their places in it; see `models.sensors.instrument`.
         pose: (N, W, 7 or more) CoM and quaternion at the start of each step.
-        declared: the values of `Declared`.  rows: those of `predicted_slip.Rows`, None if nothing is known of them.
+        declared: the values of `Declared`.
+        rows: those of `predicted_slip.RowNumbers`, None if nothing is known of them.
         at: (K, 3) and share: (K,), scratch; sums: of `predicted_slip.Sums`, scratch.
-        readings, held: of `ContactReadings` and `Held`, which are written.
+        readings, held: of `ContactReadings` and `RowEffects`, which are written.
     """
     points, up, across, near, landing = declared
     force, found, stray, strays, depth = readings

@@ -10,7 +10,7 @@ from pivoting.controller.rotations import exponential, quaternion_product
 from pivoting.controller.validate import fail
 from pivoting.models.frames import matrix
 from pivoting.models.placement.contact_candidates import contact_points
-from pivoting.sim.belief import Belief
+from pivoting.sim.belief import Believed
 from pivoting.sim.pipeline.law_control import LawSolver
 from pivoting.sim.pipeline.plan_playback import PlanPlayback
 from pivoting.sim.pipeline.receding_horizon_control import RecedingHorizonControl
@@ -21,7 +21,7 @@ NEAR = 0.02  # of the object's size: a corner that comes closer to the table wit
 
 
 def receding_horizon_control(
-    case: Scenario, belief: Belief, law: LawSolver, reference: Turn, worlds: int, dt: float, steps: int
+    case: Scenario, belief: Believed, law: LawSolver, reference: Turn, worlds: int, dt: float, steps: int
 ) -> RecedingHorizonControl:
     """The scenario's receding horizons, one for each world.
 
@@ -41,7 +41,7 @@ def receding_horizon_control(
     return RecedingHorizonControl(horizons, law, reference, dt, every, steps)
 
 
-def plan_playback(case: Scenario, belief: Belief, reference: Turn, dt: float, steps: int) -> PlanPlayback:
+def plan_playback(case: Scenario, belief: Believed, reference: Turn, dt: float, steps: int) -> PlanPlayback:
     """The scenario's whole motion as one plan that is played; see `receding_horizon_control`."""
     step = float(case.plan_step)
     per = round(step / dt)
@@ -54,7 +54,7 @@ def plan_playback(case: Scenario, belief: Belief, reference: Turn, dt: float, st
     return PlanPlayback(Planner(horizon), reference, per)
 
 
-def scenario_horizon(case: Scenario, belief: Belief, steps: int | None = None) -> Horizon:
+def scenario_horizon(case: Scenario, belief: Believed, steps: int | None = None) -> Horizon:
     """The scenario's horizon; `steps` in place of its own."""
     controller = belief.attached.controller
     return Horizon(
@@ -69,7 +69,7 @@ def scenario_horizon(case: Scenario, belief: Belief, steps: int | None = None) -
     )
 
 
-def _watched(belief: Belief) -> Array:
+def _watched(belief: Believed) -> Array:
     """(P, 3) corners, from the CoM in object axes, that come down on the table at an end of the contact's range [m]."""
     there, model = belief.placement, belief.attached.model
     body, space = there.body, belief.attached.controller.space

@@ -12,7 +12,7 @@ from pivoting.controller.wrench_controller import WrenchController
 from pivoting.models.frames import matrix
 from pivoting.models.names import ModelError
 from pivoting.models.scenes import load
-from pivoting.sim.belief import Belief, believe
+from pivoting.sim.belief import Believed, believe
 from pivoting.sim.engine_log import engine_log
 from pivoting.sim.joint_drag import drag_wrench
 from pivoting.sim.pipeline.apply_wrench import FreeWrench
@@ -91,7 +91,7 @@ class _Begun(NamedTuple):
 
     asked: Scenario
     case: Scenario
-    belief: Belief
+    belief: Believed
     world: World
     time: Array
     reference: Samples

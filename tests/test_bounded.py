@@ -183,7 +183,7 @@ def test_a_bound_is_a_heavier_weight(controller: WrenchController, kind: str) ->
         out = np.empty((1, nw)), np.empty((1, nw)), np.empty((1, n)), np.empty(1), np.empty(1, np.int8)
         q, q_d = tilted(angle)[None], tilted(wanted)[None]
         own, none = tuple(bounds.stacked(nw)), np.zeros((1, nw))
-        step_worlds(belief, own, *work, 1e-9, np.hstack([still, q, still, still]), q_d, still, still, none, *out)
+        step_worlds(belief, own, *work, 1e-9, np.hstack([still, q, still, still]), (q_d, still, still), none, out)
         assert out[4][0] == 0
         return tuple(values[0] for values in out[:3])
 

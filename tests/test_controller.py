@@ -52,7 +52,7 @@ def stepped(
     reference = [values[None] for values in controller.space.lift_motion(desired)]
     known = np.zeros((1, nw)) if external is None else external
     belief = tuple(controller.belief)
-    step_worlds(belief, None, *controller.workspace(), tolerance, states(q, omega), *reference, known, *out)
+    step_worlds(belief, None, *controller.workspace(), tolerance, states(q, omega), tuple(reference), known, tuple(out))
     return out
 
 

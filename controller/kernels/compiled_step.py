@@ -26,7 +26,18 @@ STATE = 13  # numbers of a state: position (3), quaternion (4), velocity (3), an
 
 
 class Belief(NamedTuple):
-    """What the compiled loop needs to know, as arrays; see `fill_jacobian` and `fill_required` for their meaning."""
+    """What the compiled step needs to know, as arrays.
+
+    Attributes:
+        points, offsets, frames: (K, 3), (K, 3), (K, 3, 3) of the contacts, see `fill_jacobian`.
+        pivot: (3,) from the CoM to the point that stays put (the contacts' mean), or rolls, object axes [m].
+        offset: (3,) from there to where it touches (the contacts' mean), world axes [m].
+        mu: (K,) that may be used.  f_min: (K,) [N].
+        mass: [kg].  inertia: (3, 3) object axes [kg m^2].  gravity: (3,) world axes [m/s^2].
+        law: (feedforward, kp, kd, velocity_terms), see `Law`.
+        Q_w, Q_f: weights, see `WrenchProblem`.
+        wrench_map, force_map: see `Space`.
+    """
 
     points: Array
     offsets: Array
@@ -50,18 +61,14 @@ def state_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ig
     """Write R (3, 3), J (nw, K d) and the required wrench b (nw,) at one state."""
     fill_rotation(q, R)
     fill_jacobian(R, belief.points, belief.offsets, belief.frames, belief.wrench_map, belief.force_map, J)
-    fill_required(
-        R, q, omega, q_d, omega_d, alpha_d, belief.law, belief.mass, belief.inertia, belief.gravity, belief.pivot,
-        belief.offset, belief.wrench_map, b,
-    )  # fmt: skip
+    fill_required(R, q, omega, q_d, omega_d, alpha_d, belief, b)
 
 
 @kernel
 def step_worlds(  # type: ignore[no-untyped-def]
-    belief, bounds, own, planar, several, tolerance, states, q_d, omega_d, alpha_d, external, required, wrench, force,
-    residual, status,
+    belief, bounds, own, planar, several, tolerance, states, desired, external, out
 ):  # fmt: skip
-    """State, solve and certify the problem of every world; answers are written into the last five arrays.
+    """State, solve and certify the problem of every world.
 
     Args:
         belief: the values of `Belief`, shared by the worlds.
@@ -70,15 +77,16 @@ def step_worlds(  # type: ignore[no-untyped-def]
         own, planar, several: `WrenchController.workspace()`.
         tolerance: largest relative KKT residual of status 0 (solved).
         states: (W, 13) as measured; of each its orientation and its angular velocity count, see `STATE`.
-        q_d, omega_d, alpha_d: (W, 4), (W, 3), (W, 3), the reference now; (1, ...) is the same for all worlds.
+        desired: orientations (W, 4), angular velocities and accelerations (W, 3) of the reference now; (1, ...) is the
+            same for all worlds.
         external: (W, nw) or (1, nw), known wrenches on the object besides gravity, contacts and the controller's own,
             object axes.
-        required: (W, nw) out, the right-hand side J f + w of the problem, `external` taken off, object axes.
-        wrench: (W, nw) out, in object axes; nan where the status is 2 (failed: no finite answer).
-        force: (W, K d) out, in contact axes.
-        residual: (W,) out.  status: (W,) out, int8: 0 solved, 1 inaccurate, 2 failed.
+        out: required (W, nw), the right-hand side J f + w of the problem, `external` taken off, object axes; wrench
+            (W, nw), object axes, nan where the status is 2 (failed: no finite answer); force (W, K d), contact axes;
+            residual (W,); status (W,) int8: 0 solved, 1 inaccurate, 2 failed. They are written.
     """
-    belief = Belief(*belief)
+    belief, (q_d, omega_d, alpha_d) = Belief(*belief), desired
+    required, wrench, force, residual, status = out
     nw = belief.wrench_map.shape[0]
     R, J, heavier, root = own
     Q_w, Q_f, mu, f_min = belief.Q_w, belief.Q_f, belief.mu, belief.f_min  # taken out once: it shows in the plane

@@ -66,7 +66,7 @@ class Mechanics(NamedTuple):
     units: Units
 
 
-class Motion(NamedTuple):
+class MotionRows(NamedTuple):
     """towards[0] d_t + towards[1] d_{t-1} + towards[2] d_{t-2} + by_wrench w_t + by_force f_t + constant = 0.
 
     d: corrections of the poses, (nq,) each; zero for the given pose 0. All in `Units`.
@@ -120,6 +120,85 @@ def fill_start(table, to_table, kept, h, ahead, position, orientation, velocity,
 
 
 @subroutine
+def _fill_inertia(body, order, h, scratch):  # type: ignore[no-untyped-def]
+    """Write what acceleration and gravity ask for in one step, and how that changes with the poses at its end, at its
+    start and before, into rows 2 and blocks 0 to 2 of the scratch; its other rows and turns are as `fill_motion` has
+    them."""
+    hatted, gyro = scratch.turns[1], scratch.turns[3]
+    end, start, last_end, last_start = scratch.turns[4], scratch.turns[5], scratch.turns[6], scratch.turns[7]
+    y, last, rows, full, spin = (
+        scratch.poses[0], scratch.poses[1], scratch.poses[2], scratch.poses[3], scratch.poses[4]
+    )  # fmt: skip
+    X, unit, light = scratch.blocks[:3], body.mass / h**2, 1.0 / h**2
+    for k in range(3):
+        for i in range(6):
+            for j in range(6):
+                X[k, i, j] = 0.0
+    for i in range(3):
+        X[0, i, i], X[1, i, i] = unit, -unit
+    add_product(light, body.inertia, end, X[0], 3, 3)
+    add_product(light, body.inertia, start, X[1], 3, 3)
+    for i in range(6):
+        full[i] = y[i] - (order - 1) * last[i]
+    for i in range(3):
+        rows[i] = unit * full[i] - body.mass * body.gravity[i]
+        rows[3 + i] = light * (
+            body.inertia[i, 0] * full[3] + body.inertia[i, 1] * full[4] + body.inertia[i, 2] * full[5]
+        )
+    if order == 2:
+        for i in range(3):
+            X[1, i, i] -= unit
+            X[2, i, i] += unit
+            spin[i] = (body.inertia[i, 0] * last[3] + body.inertia[i, 1] * last[4] + body.inertia[i, 2] * last[5]) / h
+        c0, c1, c2 = cross(last[3], last[4], last[5], spin[0], spin[1], spin[2])
+        rows[3] += c0 / h
+        rows[4] += c1 / h
+        rows[5] += c2 / h
+        # d(omega x I omega - I omega / h) by y_{t-1}
+        fill_hat(spin[0], spin[1], spin[2], gyro)
+        for i in range(3):
+            for j in range(3):
+                gyro[i, j] = -gyro[i, j] / h - light * body.inertia[i, j]
+        fill_hat(last[3], last[4], last[5], hatted)
+        add_product(light, hatted, body.inertia, gyro, 0, 0)
+        add_product(1.0, gyro, last_end, X[1], 3, 3)
+        add_product(1.0, gyro, last_start, X[2], 3, 3)
+
+
+@subroutine
+def _fill_forces(body, wrench, force, scratch, X, by_force):  # type: ignore[no-untyped-def]
+    """Write the contact forces' part of one step's equations, and add how it and the wrench's turn with the pose.
+
+    Args:
+        wrench: (nw,), force: (K d,).  X: (6, 6), added to.  by_force: (nq, K d), written.
+    """
+    K, d, nw, units = body.points.shape[0], body.frames.shape[2], body.pick.shape[0], body.units
+    R, hatted, turning, full = scratch.turns[0], scratch.turns[1], scratch.turns[2], scratch.poses[3]
+    for i in range(6):
+        full[i] = 0.0
+    for i in range(nw):
+        full[body.pick[i]] = body.sign[i] * wrench[i]
+    fill_hat(full[0], full[1], full[2], hatted)
+    add_product(1.0, R, hatted, X, 0, 3)  # R w turns by -R w^
+    for k in range(K):
+        p0, p1, p2 = body.points[k, 0], body.points[k, 1], body.points[k, 2]
+        g0 = g1 = g2 = 0.0
+        for j in range(d):
+            a0, a1, a2 = body.frames[k, 0, j], body.frames[k, 1, j], body.frames[k, 2, j]
+            b0, b1, b2 = into(R, a0, a1, a2)
+            full[0], full[1], full[2] = a0, a1, a2
+            full[3], full[4], full[5] = cross(p0, p1, p2, b0, b1, b2)
+            for r in range(nw):
+                by_force[r, d * k + j] = -body.sign[r] * full[body.pick[r]] * units.force / units.wrench[r]
+            g0 += b0 * force[d * k + j]
+            g1 += b1 * force[d * k + j]
+            g2 += b2 * force[d * k + j]
+        fill_hat(g0, g1, g2, hatted)  # and R'g by (R'g)^
+        fill_hat(p0, p1, p2, turning)
+        add_product(-1.0, turning, hatted, X, 3, 3)
+
+
+@subroutine
 def fill_motion(body, order, lag, h, path, wrench, force, scratch, out):  # type: ignore[no-untyped-def]
     """Write the equations of motion, to first order in poses and exactly in wrench and force, about a path.
 
@@ -127,90 +206,28 @@ def fill_motion(body, order, lag, h, path, wrench, force, scratch, out):  # type
         body: `Mechanics`.  order, lag: of the integrator.  h: [s].  path: `Path`.
         wrench, force: (N, nw), (N, K d) [N, N m], with which the forces' dependence on the pose is linearised; zero:
             it is not.
-        scratch: `Scratch`.  out: `Motion`.
+        scratch: `Scratch`.  out: `MotionRows`.
     """
-    N, K, d = wrench.shape[0], body.points.shape[0], body.frames.shape[2]
-    nw, units = body.pick.shape[0], body.units
-    R, hatted, turning, gyro = scratch.turns[0], scratch.turns[1], scratch.turns[2], scratch.turns[3]
+    nw, units, R = body.pick.shape[0], body.units, scratch.turns[0]
     end, start, last_end, last_start = scratch.turns[4], scratch.turns[5], scratch.turns[6], scratch.turns[7]
-    y, last, rows, full, spin = (
-        scratch.poses[0], scratch.poses[1], scratch.poses[2], scratch.poses[3], scratch.poses[4]
-    )  # fmt: skip
+    y, last, rows = scratch.poses[0], scratch.poses[1], scratch.poses[2]
     X, gain = scratch.blocks[:3], scratch.blocks[3]
-    unit, light = body.mass / h**2, 1.0 / h**2
     for i in range(6):
         last[i] = path.arriving[i]
     for i in range(3):
         for j in range(3):
             last_end[i, j] = last_start[i, j] = 0.0
-    for t in range(N):
+    for t in range(wrench.shape[0]):
         for i in range(3):
             y[i] = path.position[t + 1, i] - path.position[t, i]
         y[3], y[4], y[5] = rotation_error(path.orientation[t], path.orientation[t + 1])
         fill_difference_jacobians(y[3:], end, start)
-        # inertia
-        for k in range(3):
-            for i in range(6):
-                for j in range(6):
-                    X[k, i, j] = 0.0
-        for i in range(3):
-            X[0, i, i], X[1, i, i] = unit, -unit
-        add_product(light, body.inertia, end, X[0], 3, 3)
-        add_product(light, body.inertia, start, X[1], 3, 3)
-        for i in range(6):
-            full[i] = y[i] - (order - 1) * last[i]
-        for i in range(3):
-            rows[i] = unit * full[i] - body.mass * body.gravity[i]
-            rows[3 + i] = light * (
-                body.inertia[i, 0] * full[3] + body.inertia[i, 1] * full[4] + body.inertia[i, 2] * full[5]
-            )
-        if order == 2:
-            for i in range(3):
-                X[1, i, i] -= unit
-                X[2, i, i] += unit
-                spin[i] = (
-                    body.inertia[i, 0] * last[3] + body.inertia[i, 1] * last[4] + body.inertia[i, 2] * last[5]
-                ) / h
-            c0, c1, c2 = cross(last[3], last[4], last[5], spin[0], spin[1], spin[2])
-            rows[3] += c0 / h
-            rows[4] += c1 / h
-            rows[5] += c2 / h
-            # d(omega x I omega - I omega / h) by y_{t-1}
-            fill_hat(spin[0], spin[1], spin[2], gyro)
-            for i in range(3):
-                for j in range(3):
-                    gyro[i, j] = -gyro[i, j] / h - light * body.inertia[i, j]
-            fill_hat(last[3], last[4], last[5], hatted)
-            add_product(light, hatted, body.inertia, gyro, 0, 0)
-            add_product(1.0, gyro, last_end, X[1], 3, 3)
-            add_product(1.0, gyro, last_start, X[2], 3, 3)
-        # forces, at the pose where they act
-        if lag == 2 and t == 0:
+        _fill_inertia(body, order, h, scratch)
+        if lag == 2 and t == 0:  # forces, at the pose where they act
             fill_rotation(path.before[3:], R)
         else:
             fill_rotation(path.orientation[t + 1 - lag], R)
-        for i in range(6):
-            full[i] = 0.0
-        for i in range(nw):
-            full[body.pick[i]] = body.sign[i] * wrench[t, i]
-        fill_hat(full[0], full[1], full[2], hatted)
-        add_product(1.0, R, hatted, X[lag], 0, 3)  # R w turns by -R w^
-        for k in range(K):
-            p0, p1, p2 = body.points[k, 0], body.points[k, 1], body.points[k, 2]
-            g0 = g1 = g2 = 0.0
-            for j in range(d):
-                a0, a1, a2 = body.frames[k, 0, j], body.frames[k, 1, j], body.frames[k, 2, j]
-                b0, b1, b2 = into(R, a0, a1, a2)
-                full[0], full[1], full[2] = a0, a1, a2
-                full[3], full[4], full[5] = cross(p0, p1, p2, b0, b1, b2)
-                for r in range(nw):
-                    out.by_force[t, r, d * k + j] = -body.sign[r] * full[body.pick[r]] * units.force / units.wrench[r]
-                g0 += b0 * force[t, d * k + j]
-                g1 += b1 * force[t, d * k + j]
-                g2 += b2 * force[t, d * k + j]
-            fill_hat(g0, g1, g2, hatted)  # and R'g by (R'g)^
-            fill_hat(p0, p1, p2, turning)
-            add_product(-1.0, turning, hatted, X[lag], 3, 3)
+        _fill_forces(body, wrench[t], force[t], scratch, X[lag], out.by_force[t])
         for i in range(3):
             for j in range(3):
                 gain[i, j] = R[i, j]

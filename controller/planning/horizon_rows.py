@@ -4,7 +4,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 from pivoting.controller.kernels.compilation import kernel, subroutine
-from pivoting.controller.planning.equations_of_motion import Motion, fill_motion
+from pivoting.controller.planning.equations_of_motion import MotionRows, fill_motion
 from pivoting.controller.rotations import cross, fill_difference_jacobians, fill_rotation, into, rotation_error, turn
 from pivoting.controller.validate import Array
 
@@ -15,7 +15,7 @@ class Rows(NamedTuple):
     sticking: (N, S, nq), off: (N, S).  clearance: (N, P, nq), room: (N, P).
     """
 
-    motion: Motion
+    motion: MotionRows
     sticking: Array
     off: Array
     clearance: Array
@@ -24,7 +24,7 @@ class Rows(NamedTuple):
     @classmethod
     def empty(cls, N: int, nq: int, n: int, S: int, P: int) -> Self:
         """Room for them."""
-        motion = Motion(np.empty((N, nq)), np.empty((3, N, nq, nq)), np.empty((N, nq, nq)), np.empty((N, nq, n)))
+        motion = MotionRows(np.empty((N, nq)), np.empty((3, N, nq, nq)), np.empty((N, nq, nq)), np.empty((N, nq, n)))
         return cls(motion, np.empty((N, S, nq)), np.empty((N, S)), np.empty((N, P, nq)), np.empty((N, P)))
 
 

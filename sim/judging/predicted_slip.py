@@ -36,7 +36,7 @@ UNHELD = 10  # steps on end that an end of an edge may be without contact while 
 _impedance = subroutine(impedance)
 
 
-class Held(NamedTuple):
+class RowEffects(NamedTuple):
     """What the contact rows do at K declared contacts; leading axes of steps and worlds.
 
     Attributes:
@@ -57,7 +57,7 @@ def stepped_point(model: mujoco.MjModel, body: int) -> Array:
     return np.zeros(3) if free else np.array(model.jnt_pos[joint])
 
 
-class Rows(NamedTuple):
+class RowNumbers(NamedTuple):
     """What of `ContactRows` the compiled sum over contacts needs: numbers, for arrays take longer to compile.
 
     Attributes:
@@ -123,7 +123,7 @@ def add_row(rows, push, pulls, depth, where, tangent, other, at, share, sums):  
     """Add what the rows of one contact do; returns whether it slides, and adds nothing of one that does.
 
     Args:
-        rows: the values of `Rows`.  push, pulls: its force along its normal and both tangents [N].
+        rows: the values of `RowNumbers`.  push, pulls: its force along its normal and both tangents [N].
         depth: [m].  where: its place [m].  tangent, other: both its tangents.
         at: (K, 3) where the declared contacts touch [m].  share: (K,) of it that each carries.
         sums: the values of `Sums`.
@@ -166,7 +166,7 @@ def add_row(rows, push, pulls, depth, where, tangent, other, at, share, sums):  
 
 @subroutine
 def end_rows(sums, give, above):  # type: ignore[no-untyped-def]
-    """Write what the rows do at the declared contacts, give (K, 2) and above (K,); see `Held`.
+    """Write what the rows do at the declared contacts, give (K, 2) and above (K,); see `RowEffects`.
 
     The object is rigid, so that along an edge it all is linear in the place.
     """
@@ -191,7 +191,7 @@ def end_rows(sums, give, above):  # type: ignore[no-untyped-def]
 @np.errstate(invalid="ignore", over="ignore")
 def drift(
     rows: ContactRows,
-    of: Held,
+    of: RowEffects,
     turning: Array,
     touching: Array,
     velocity: Array,
@@ -239,7 +239,7 @@ def drift(
     return path if not rows.unknown else np.full_like(path, np.nan)
 
 
-def why_unknown(rows: ContactRows | None, of: Held, time: Array, settle: int = 0) -> list[str]:
+def why_unknown(rows: ContactRows | None, of: RowEffects, time: Array, settle: int = 0) -> list[str]:
     """Of each world why its drift cannot be told, or "".
 
     Args:
@@ -256,7 +256,7 @@ def why_unknown(rows: ContactRows | None, of: Held, time: Array, settle: int = 0
 _FAILURES = ("", "a contact slides", "no contact holds it", "an end of the edge is without contact")
 
 
-def _failure(of: Held, settle: int) -> NDArray[np.int8]:
+def _failure(of: RowEffects, settle: int) -> NDArray[np.int8]:
     """(W, N) what of `_FAILURES` keeps the rows from telling the drift, after the first steps."""
     free = np.isnan(of.give[..., 0])
     count = np.cumsum(free, axis=1)

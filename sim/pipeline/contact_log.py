@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pivoting.models.contact_softness import ContactRows
 from pivoting.sim.contact_sensing import ContactReadings, Declared, sort_contacts
-from pivoting.sim.judging.predicted_slip import Held, Rows, Sums
+from pivoting.sim.judging.predicted_slip import RowEffects, RowNumbers, Sums
 
 Array = NDArray[np.float64]
 BLOCK = 256  # worlds times steps whose contacts are sorted at once: what stays in the caches
@@ -24,12 +24,12 @@ class ContactLog:
     ):
         K = len(declared.points)
         places = [(where[key].start, where[key].stop) for key in ("contacts", "touching")]
-        known = None if rows is None else tuple(Rows.of(rows, axes))
+        known = None if rows is None else tuple(RowNumbers.of(rows, axes))
         self._with = *places, tuple(declared), known, np.empty((K, 3)), np.empty(K), tuple(Sums.of(K))
         self.readings = ContactReadings(
             *(np.empty((steps, worlds, *rest)) for rest in ((K, 3), (), (), (), ())),
         )
-        self.held = Held(
+        self.held = RowEffects(
             np.full((steps, worlds, K, 2), np.nan), np.zeros((steps, worlds, K)), np.zeros((steps, worlds), np.bool_)
         )
 

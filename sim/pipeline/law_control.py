@@ -33,7 +33,9 @@ class LawSolver:
     def solve(self, states: States, desired: Desired, out: Answers, external: Array | None = None) -> None:
         """Write the answers on the reference as it is."""
         known = self._none if external is None else external
-        step_worlds(self._belief, self._bounds, *self._work, TOLERANCE, states.values, *desired, known, *out)
+        step_worlds(
+            self._belief, self._bounds, *self._work, TOLERANCE, states.values, tuple(desired), known, tuple(out)
+        )
 
 
 class LawControl:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.kernels.compiled_step import STATE
 from pivoting.sim.contact_sensing import ContactReadings
-from pivoting.sim.judging.predicted_slip import Held
+from pivoting.sim.judging.predicted_slip import RowEffects
 from pivoting.sim.pipeline.stages import Answers
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ class Log(NamedTuple):
         answers: `Answers`, (W, N, ...).
         acting: (W, N, nw) wrenches that act, object axes; None where the actuators change nothing.
         wrench_world: (W, N, 6) the same as force and torque at the centre of mass, world axes.
-        contacts, held: `ContactReadings` and `Held`, (W, N, ...).
+        contacts, held: `ContactReadings` and `RowEffects`, (W, N, ...).
         control_ns: (N,) for all worlds together.
     """
 
@@ -35,12 +35,12 @@ class Log(NamedTuple):
     acting: Array | None
     wrench_world: Array
     contacts: ContactReadings
-    held: Held
+    held: RowEffects
     control_ns: Array
 
 
 def empty_log(
-    steps: int, worlds: int, widths: tuple[int, int], contacts: tuple[ContactReadings, Held], stages: Any
+    steps: int, worlds: int, widths: tuple[int, int], contacts: tuple[ContactReadings, RowEffects], stages: Any
 ) -> Log:
     """The log of a run that begins.
 
