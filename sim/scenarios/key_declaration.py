@@ -206,7 +206,7 @@ def described(cls: type) -> Iterator[tuple[str, list[tuple[str, str]]]]:
 
 def documented(cls: type[T]) -> type[T]:
     """A dataclass whose docstring goes on with its keys."""
-    lines, wrapped = [], TextWrapper(120, initial_indent=8 * " ", subsequent_indent=12 * " ")
+    lines, wrapped = [], TextWrapper(120, initial_indent=8 * " ", subsequent_indent=12 * " ", break_on_hyphens=False)
     for group, rows in described(cls):
         lines += ["", f"    Keys of {group}:", *(wrapped.fill(f"{name}: {line}") for name, line in rows)]
     cls.__doc__ = (cls.__doc__ or "").rstrip() + "\n" + "\n".join(lines) + "\n"
