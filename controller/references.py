@@ -1,8 +1,10 @@
-"""References: where the object should be at each time, as angle, rate and acceleration."""
+"""References: where the object should be at each time, as angle, rate and acceleration; and those that have a name."""
 
+import inspect
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +29,49 @@ class Reference(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class NamedReference:
+    """A reference that a scenario asks for by its name.
+
+    Attributes:
+        meaning: what the motion is, in a few words.
+        make: makes it; each of its parameters has the name of a key of the scenario, and takes its value [rad, s].
+    """
+
+    meaning: str
+    make: Callable[..., Reference]
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The keys of a scenario that it is made of."""
+        return tuple(inspect.signature(self.make).parameters)
+
+    def __str__(self) -> str:
+        return self.meaning
+
+
+REFERENCES: dict[str, NamedReference] = {}  # by name; filled, where the functions are defined, by `reference`
+
+Make = TypeVar("Make", bound=Callable[..., Reference])
+
+
+def reference(name: str, meaning: str) -> Callable[[Make], Make]:
+    """Let scenarios ask for what the decorated function or class makes by a `name`; see `NamedReference`.
+
+    Raises:
+        ValueError: the name is taken.
+    """
+    if name in REFERENCES:
+        raise fail("name", name, "a name that no other reference has")
+
+    def register(make: Make) -> Make:
+        REFERENCES[name] = NamedReference(meaning, make)
+        return make
+
+    return register
+
+
+@reference("constant", "stay at theta")
 @dataclass(frozen=True)
 class Constant:
     """Stay at `theta` [rad]."""
@@ -84,6 +129,16 @@ class MinimumJerk:
         return Motion(angle, rate, acceleration)
 
 
+@reference("arc", "go from theta to theta_end")
+def _arc(theta: float, theta_end: float, seconds: float, hold: float) -> MinimumJerk:
+    return MinimumJerk((theta, theta_end), seconds, hold)
+
+
+@reference("return", "go from theta to theta_end and back")
+def _return(theta: float, theta_end: float, seconds: float, hold: float) -> MinimumJerk:
+    return MinimumJerk((theta, theta_end, theta), seconds, hold)
+
+
 @dataclass(frozen=True)
 class Sine:
     """theta = mean + amplitude sin(2 pi t / period) [rad, s]; it starts at full speed, so start slowly or small."""
@@ -107,6 +162,11 @@ class Sine:
         w = 2.0 * np.pi / self.period
         s, c = np.sin(w * np.asarray(times)), np.cos(w * np.asarray(times))
         return Motion(self.mean + self.amplitude * s, self.amplitude * w * c, -self.amplitude * w * w * s)
+
+
+@reference("sine", "swing about theta")
+def _sine(theta: float, amplitude: float, period: float) -> Sine:
+    return Sine(theta, amplitude, period)
 
 
 class Sampled:

@@ -58,7 +58,7 @@ def read_friction(model: mujoco.MjModel, body: int, support: int, points: ArrayL
         if condim == 1 or max(tangents) <= LEAST:
             why = "condim 1" if condim == 1 else "friction 0"
             touches = f"{label(model, geom)} touches {label(model, support)} without friction ({why})"
-            raise ModelError(f"mu = None: {touches}, and nothing sticks; give both geoms condim 3 and friction")
+            raise ModelError(f"{touches}, and nothing sticks; give both geoms condim 3 and friction")
     least = {min(tangents) for _, tangents in found.values()}
     if not there and len(least) > 1:
         raise ModelError(f"mu = None: the body's geoms give {sorted(least)}; give mu")

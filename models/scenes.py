@@ -14,13 +14,12 @@ from pivoting.models.frames import Array
 from pivoting.models.length_unit import length_unit
 from pivoting.models.names import ModelError, body_id, body_name
 from pivoting.models.rigid_body import FILE_FRAME, degrees_of_freedom, initial_data
+from pivoting.models.scene_changes import CHANGES, Edit
 from pivoting.models.solver_settings import choose
 from pivoting.models.support_surfaces import find_support
 
 BODY, TABLE = "block", "table"  # names in the scenes
-WORLD_KEYS = ("mu", "mass", "size", "incline", "gravity", "dt", "timeconst", "impedance", "impratio")
-
-INERTIA_FROM_GEOM = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
+WORLD_KEYS = tuple(CHANGES)
 
 
 def scene_path(name: str) -> Path:
@@ -81,46 +80,27 @@ class Scene:
         return model
 
     def changed(self, changes: Mapping[str, float]) -> "Scene":
-        """This scene with `changes`, whose keys are `WORLD_KEYS`.
+        """This scene with `changes`, whose keys are `WORLD_KEYS`; what each changes: `scene_changes`.
 
-        mu: sliding friction of the body and its support. mass [kg]: of the body, its inertia in proportion. size [m]
-        (the longest side): of a body of one box. incline [deg]: the support rises to the right. gravity [m/s^2]: its
-        magnitude, along the file's direction. Lengths are in m whatever the file's unit is. dt [s]: the time step.
-        timeconst [s], impedance: of the contacts; with the settings of the shipped scenes the former is 2.1 dt unless
-        it is given. impratio: the option.
+        Lengths are in m whatever the file's unit is. With the contact settings of the shipped scenes timeconst is
+        2.1 dt unless it is given.
 
         Raises:
-            ModelError: the file has nothing that a key could change.
+            ModelError: there is no such key, or the file has nothing that a key could change.
         """
         if self.unchanged and not changes:
             return self
+        for key, value in changes.items():
+            if key not in CHANGES:
+                raise ModelError(f"{key} = {value!r}: of a scene only {', '.join(CHANGES)} can be changed")
         spec, wanted = self.spec.copy(), dict(changes)
-        geoms, table, parts = self._parts(spec)
-        ours = bool(self.replaced) or self.path.parent == Path(__file__).parent
-        if "dt" in wanted:
-            spec.option.timestep = wanted["dt"]
-        if self.replaced or (ours and "dt" in wanted):
-            wanted.setdefault("timeconst", STIFF * spec.option.timestep)
-        if "impratio" in wanted:
-            spec.option.impratio = wanted["impratio"]
-        if "gravity" in wanted:
-            size = np.linalg.norm(spec.option.gravity)
-            down = spec.option.gravity / size if size > 0.0 else np.array([0.0, 0.0, -1.0])
-            spec.option.gravity = wanted["gravity"] / self.unit * down
-            spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
-        scale = _resize(spec, self.body, geoms, wanted["size"], self.unit) if "size" in wanted else 1.0
-        if "incline" in wanted:
-            _incline(table, wanted["incline"])
-        for part in parts:
-            if "mu" in wanted:
-                part.friction[: 2 if isinstance(part, mujoco.MjsPair) else 1] = wanted["mu"]
-            if "timeconst" in wanted:
-                part.solref[:2] = wanted["timeconst"], 1.0
-            if "impedance" in wanted:
-                part.solimp[:2] = wanted["impedance"]
-        if spec.option.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
-            _override(spec.option, wanted)
-        return replace(self, unchanged=False, spec=spec, mass=wanted.get("mass", self.mass), scale=self.scale * scale)
+        edit = Edit(spec, self.body, self.unit, *self._parts(spec), self.mass, self.scale)
+        if self.replaced or ("dt" in wanted and self.path.parent == Path(__file__).parent):
+            wanted.setdefault("timeconst", STIFF * wanted.get("dt", spec.option.timestep))
+        for key, change in CHANGES.items():
+            if key in wanted:
+                change(edit, wanted[key])
+        return replace(self, unchanged=False, spec=spec, mass=edit.mass, scale=edit.scale)
 
     def with_contacts(self, settings: ContactSettings) -> "Scene":
         """This scene with these contact parameters of the body and its support."""
@@ -206,39 +186,6 @@ def _compiled(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, tuple[str, ...]]:
         warnings.simplefilter("always", UserWarning)
         model = spec.compile()
     return model, tuple(dict.fromkeys(" ".join(str(one.message).split()) for one in said))
-
-
-def _resize(spec: mujoco.MjSpec, body: str, geoms: list[Any], size: float, unit: float) -> float:
-    """Give a body of one box its longest side [m], in a file of this unit [m]; by how much it has grown."""
-    if len(geoms) != 1:
-        raise ModelError(f"size = {size:g}: the body has {len(geoms)} geoms; change them in its file")
-    if geoms[0].type != mujoco.mjtGeom.mjGEOM_BOX:
-        raise ModelError(f"size = {size:g}: the body is not a box; change it in its file")
-    if spec.body(body).explicitinertial and spec.compiler.inertiafromgeom != INERTIA_FROM_GEOM:
-        raise ModelError(f"size = {size:g}: the body's <inertial> would not change with it; change both in its file")
-    scale = 0.5 * size / unit / float(np.max(geoms[0].size))
-    geoms[0].size = np.asarray(geoms[0].size) * scale
-    return scale
-
-
-def _incline(table: Any, incline: float) -> None:
-    """Tilt a plane of the world body; it rises to the right."""
-    fixed = table.parent.id == 0 and table.frame is None  # of a static body that was fused the frame is left
-    if table.type != mujoco.mjtGeom.mjGEOM_PLANE or not fixed:
-        raise ModelError(f"incline = {incline:g}: the support is not a plane of the world body; tilt it in its file")
-    half = 0.5 * np.deg2rad(incline)
-    table.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT  # in place of the file's euler
-    table.quat = [np.cos(half), 0.0, -np.sin(half), 0.0]
-
-
-def _override(option: Any, wanted: Mapping[str, float]) -> None:
-    """With <flag override="enable"/> the option's own contact parameters take the place of all geoms'."""
-    if "mu" in wanted:
-        option.o_friction[:2] = wanted["mu"]
-    if "timeconst" in wanted:
-        option.o_solref[:2] = wanted["timeconst"], 1.0
-    if "impedance" in wanted:
-        option.o_solimp[:2] = wanted["impedance"]
 
 
 def _pairs(spec: mujoco.MjSpec, geoms: list[Any]) -> list[Any]:

@@ -127,7 +127,7 @@ def _set_up(asked: Scenario, controller: WrenchController | None, counts: tuple[
     for values in (time, *reference, *desired):
         values.flags.writeable = False
     turning = -matrix(belief.placement.body.table)[:, 1:2].T if belief.placement.body.dim == 2 else np.eye(3)
-    setting = Setting(*counts, world.dt, turning, case.law, case.bandwidth, case.damping)
+    setting = Setting(*counts, world.dt, turning, belief.attached.controller.law)
     return _Begun(
         asked, case, belief, world, time, reference, desired, told, follow, setting, given=controller is not None
     )

@@ -109,6 +109,10 @@ def test_a_diverged_run_is_still_json() -> None:
         (["run", "pivot-2d", "--set", "world.law=static"], "world.law"),
         (["run", "pivot-2d", "--set", "mu=.2", "--set", "mu=.3"], "--set 'mu=.3': mu is already given as .2"),
         (["run", "pivot-2d", "--set", "force_max=0.8x"], "force_max = '0.8x': must be a number, or in weights"),
+        (["run", "balance-2d", "--set", "theta_end=50"], "theta_end = 50.0: must be left out: it has no effect unless"),
+        (["run", "pivot-2d", "--set", "plan_step=.01"], "plan_step = 0.01: must be left out: it has no effect unless"),
+        (["run", "pivot-2d", "--set", "mu=1e-6"], "mu = 1e-06: must be > 1e-05, which is the least friction coeff"),
+        (["run", "pivot-2d", "--set", "f_min=1e300w"], "f_min = '1e300w': must be at most 1e+12w"),
         (["run", "pivot-2d", "--set", "limits=5"], "--set limits: must be --limit KEY=VALUE"),
         (["run", "pivot-2d", "--limit", "slip=1"], "limits.slip = '1': must be a known limit: slip_m"),
         (["run", "pivot-2d", "--limit", "slip_m=x"], "limits.slip_m = 'x': must be a number"),
@@ -168,9 +172,9 @@ def test_help_of_run_lists_the_keys() -> None:
     told = " ".join(pivoting("run", "--help").stdout.split())
     assert "--set KEY=VALUE" in told
     for words in (
-        "theta_end angle to which an arc leads (likewise) [>= 0.1 and <= 89.9 deg; default: 80]",
+        "[>= 0.1 and <= 89.9 deg; default: 80; only if reference is arc or return]",
         "force_max greatest force [> 0 N, or 2w; default: none]",
-        "slip_m [>= 0; default: 0.0001]",
+        "slip_m displacement of the contact along the support [>= 0 m; default: 0.0001]",
     ):
         assert words in told
 

@@ -2,7 +2,19 @@
 
 import numpy as np
 import pytest
-from pivoting.controller.references import Constant, MinimumJerk, Reference, Sampled, Sine
+from click.testing import CliRunner
+from pivoting.controller.references import (
+    REFERENCES,
+    Constant,
+    MinimumJerk,
+    Reference,
+    Sampled,
+    Sine,
+    reference,
+)
+from pivoting.sim import SCENARIOS, simulate
+from pivoting.sim.console.command_line import cli
+from pivoting.sim.scenarios.scenario_keys import KEYS
 
 ALL = {
     "constant": Constant(0.4),
@@ -77,3 +89,51 @@ def test_samples_are_met_and_held() -> None:
 def test_bad_input_is_named(make, message: str) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_named_references_are_made_of_keys_in_radians() -> None:
+    """As the formulas say, to the last bit; and of no value that is not a key of a scenario."""
+    rad = np.deg2rad
+    made = {
+        "constant": Constant(rad(20.0)),
+        "arc": MinimumJerk((rad(20.0), rad(50.0)), 0.7, 0.1),
+        "return": MinimumJerk((rad(20.0), rad(50.0), rad(20.0)), 0.7, 0.1),
+        "sine": Sine(rad(20.0), rad(3.0), 0.9),
+    }
+    assert set(made) == set(REFERENCES)
+    values = {"theta": 20.0, "theta_end": 50.0, "seconds": 0.7, "hold": 0.1, "amplitude": 3.0, "period": 0.9}
+    for name, expected in made.items():
+        assert set(REFERENCES[name].keys) <= set(KEYS)
+        own = {key: value for key, value in values.items() if key in REFERENCES[name].keys}
+        case = SCENARIOS["balance-2d"].change(reference=name, **own)
+        assert case.motion == expected
+        assert case.duration == (expected.duration if np.isfinite(expected.duration) else case.seconds)
+
+
+def test_a_reference_needs_nothing_but_its_name() -> None:
+    """It is then taken by --set, listed in help and in errors, and refuses the keys that it is not made of."""
+
+    def run(*settings: str):  # type: ignore[no-untyped-def]
+        words = [word for setting in settings for word in ("--set", setting)]
+        return CliRunner().invoke(cli, ["run", "balance-2d", *words, "--json"], standalone_mode=False)
+
+    assert "must be one of constant, arc, return, sine" in str(run("reference=drift").exception)
+    try:
+
+        @reference("drift", "drift from theta by amplitude")
+        def drift(theta: float, amplitude: float, seconds: float) -> MinimumJerk:
+            return MinimumJerk((theta, theta + amplitude), seconds)
+
+        assert "must be one of constant, arc, return, sine, drift" in str(run("reference=fly").exception)
+        told = " ".join(CliRunner().invoke(cli, ["run", "--help"]).output.split())
+        assert "drift (drift from theta by amplitude)" in told
+        assert "only if reference is sine or drift" in told
+        assert run("reference=drift", "amplitude=4", "seconds=0.6").exception is None
+        turned = simulate("balance-2d", reference="drift", amplitude=4.0, seconds=0.6)
+        assert np.rad2deg(turned.reference[0][[0, -1]]) == pytest.approx([30.0, 34.0])
+        assert turned.scenario.changes == {"reference": "drift", "amplitude": 4.0, "seconds": 0.6}
+        assert "period = 3.0: must be left out" in str(run("reference=drift", "period=3").exception)
+        with pytest.raises(ValueError, match="name = 'drift': must be a name that no other reference has"):
+            reference("drift", "another")
+    finally:
+        REFERENCES.pop("drift", None)

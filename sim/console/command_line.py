@@ -128,6 +128,7 @@ def run(
     weight as it is believed (of a moment at the lever from contact to centre of mass, of a rate per second), 2T twice
     its natural time, sqrt(lever / gravity).
     """
+    from pivoting.sim.scenarios.shipped_scenarios import OWN
     from pivoting.sim.scenarios.shipped_scenarios import scenario as find
     from pivoting.sim.simulation import simulate
 
@@ -135,10 +136,11 @@ def run(
     if "limits" in changes:
         raise click.BadParameter("--set limits: must be --limit KEY=VALUE")
     changes["limits"] = _pairs("--limit", limits)
-    case = (_own(**own) if scenario == "pivot" else find(scenario)).change(**changes)
+    case = (_own(**own) if scenario == OWN else find(scenario)).change(**changes)
+    case.refuse_without_effect(case.given, open_loop)
     given = [key for key, value in own.items() if value is not None and value is not False]
-    if scenario != "pivot" and given:
-        raise click.BadParameter(f"--{given[0].replace('_', '-')}: only the scenario pivot takes it, not {scenario!r}")
+    if given and not case.own:
+        raise click.BadParameter(f"--{given[0].replace('_', '-')}: only the scenario {OWN} takes it, not {scenario!r}")
     if record_world is not None and (out is None or record_world >= worlds):
         allowed = "given with --out" if out is None else f"less than {worlds}, the number of worlds"
         raise click.BadParameter(f"--record-world {record_world}: must be {allowed}")

@@ -29,13 +29,12 @@ class Saved(NamedTuple):
 
 def stem(case: Scenario) -> str:
     """What a scenario's files are called: its name; of your own object also the model, body and contact."""
-    if isinstance(case.scene, str):
-        parts = [case.name]
-    else:
+    parts = [case.name]
+    if case.own:
         contact = case.contact
         if not isinstance(contact, str):
             contact = "+".join(",".join(f"{x:g}" for x in point) for point in np.atleast_2d(contact))
-        parts = [case.name, Path(case.scene).stem, case.body, contact]
+        parts += [case.path.stem, case.body, contact]
     return "-".join(re.sub(r"[^\w.,+#-]+", "_", part) for part in dict.fromkeys(parts) if part)
 
 

@@ -1,7 +1,6 @@
 """What people read: tables of a run, of the scenarios and of the worked example."""
 
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -10,9 +9,9 @@ from pivoting.controller.worked_example import EXAMPLES, Digit
 from pivoting.models.length_unit import NAMES
 from pivoting.sim.judging.verdict import Limits
 from pivoting.sim.run import Run
+from pivoting.sim.scenarios.key_declaration import declared_keys, described
 from pivoting.sim.scenarios.scenario import Scenario
-from pivoting.sim.scenarios.scenario_keys import GROUPS, KEYS
-from pivoting.sim.scenarios.shipped_scenarios import SCENARIOS
+from pivoting.sim.scenarios.shipped_scenarios import OWN, SCENARIOS
 from rich.console import Console
 from rich.table import Table
 
@@ -48,8 +47,9 @@ def print_run(console: Console, run: Run) -> None:
     """The verdict table of a run."""
     summary = run.summary()
     console.print(f"[bold]{run.scenario.label}[/]: {run.scenario.summary}", soft_wrap=True, highlight=False)
+    keys = declared_keys(type(run.scenario))
     resolved = [
-        f"{key} = {getattr(run.scenario, key)}: {value:.4g} {KEYS[key].unit}"
+        f"{key} = {getattr(run.scenario, key)}: {value:.4g} {keys[key].unit}"
         for key, value in summary["resolved"].items()
     ]
     read = [f"{name}: {_words(summary[key])}" for key, name in _READ.items() if summary.get(key)]
@@ -118,18 +118,9 @@ def print_run(console: Console, run: Run) -> None:
 
 
 def key_help() -> list[tuple[str, list[tuple[str, str]]]]:
-    """The keys of `--set` by whose they are, each with what it means and may be and its default; those of `--limit`."""
-    defaults = {each.name: each.default for each in fields(Scenario)}
-    out = []
-    for group in GROUPS:
-        rows = []
-        for name, key in KEYS.items():
-            if key.of == group:
-                default = key.optional if defaults[name] is None else _plain(defaults[name])
-                rows.append((name, f"{key.help} [{key.allowed}; default: {default}]"))
-        out.append((f"Keys of --set, {group}", rows))
-    limits = [(name, f"[>= 0; default: {_plain(value)}]") for name, value in vars(Limits()).items()]
-    return [*out, ("Keys of --limit, what the verdict allows, with the unit in the name", limits)]
+    """The keys of `--set` by what they are keys of, and those of `--limit`, each with what it means and may be."""
+    options = {"--set": Scenario, "--limit": Limits}
+    return [(f"Keys of {option}: {group}", rows) for option, cls in options.items() for group, rows in described(cls)]
 
 
 def _words(read: Mapping[str, Any], between: str = ", ") -> str:
@@ -168,7 +159,7 @@ def print_scenarios(console: Console) -> None:
     for name, case in SCENARIOS.items():
         console.print(f"{name:{width}}  {case.summary}", highlight=False, soft_wrap=True)
     own = "an object of your own, by 20 deg: --model FILE.xml --body NAME --contact vertex"
-    console.print(f"{'pivot':{width}}  {own}", highlight=False, soft_wrap=True)
+    console.print(f"{OWN:{width}}  {own}", highlight=False, soft_wrap=True)
 
 
 def print_examples(console: Console, results: list[tuple[list[Digit], Solution]]) -> None:

@@ -125,7 +125,7 @@ def _reasons(case: _Case) -> Iterator[str]:
         if np.isfinite(floor):
             part = f"{100.0 * min(floor / slip, 1.0):.0f} % of it the simulator's own"
         yield f"the contact crept by {1e3 * slip:.3g} mm without sliding, {part}"
-    if run.scenario.name == "pivot" and not run.scenario.chosen:
+    if run.scenario.own and not run.scenario.chosen:
         yield "its contact and solver parameters are the file's: without --as-modelled they are chosen"
     if case.failed("angle_error_rms_deg") or case.failed("angle_error_max_deg"):
         yield f"the angle was off by up to {float(run.measures.angle_error_max_deg[i]):.3g} deg"
@@ -165,7 +165,7 @@ def _remedies(case: _Case) -> Iterator[Remedy]:
     first = int((run.log.contacts.strays[i] > 0.0).argmax()) if run.strays else len(run.time)
     if first < (len(run.time) if case.let_go is None else case.let_go):  # else it fell on what it touches
         ends = float(np.rad2deg(run.theta[i, first])) - 1.0
-        if scenario.theta < ends < scenario.theta_end:
+        if "theta_end" in scenario.reference_keys and scenario.theta < ends < scenario.theta_end:
             yield Remedy({"theta_end": round(ends, 2)}, "the arc ends before it touches anything else")
     yield from _contact(case)
     share = 1.0 - ROOM * case.friction_found / case.mu
@@ -218,7 +218,7 @@ def _floors(case: _Case) -> Iterator[float]:
 def _slower(case: _Case) -> Iterator[Remedy]:
     """A longer arc: what turning causes goes with the square of the rate."""
     scenario, run = case.run.scenario, case.run
-    if not isinstance(scenario.reference, str) or scenario.reference not in ("arc", "return"):
+    if "seconds" not in scenario.reference_keys:
         return
     seconds = float(scenario.absolute(run.load).seconds)
     over = _over(case, "slip_max_m", "angle_error_rms_deg", "angle_error_max_deg")

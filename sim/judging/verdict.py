@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.controller.validate import fail, number
+from pivoting.controller.validate import fail
+from pivoting.sim.scenarios.key_declaration import declared_keys, documented, key
 
 if TYPE_CHECKING:
     from pivoting.sim.judging.measures import Measures
@@ -14,43 +15,70 @@ if TYPE_CHECKING:
 FALL = 0.01  # [s]
 
 
+ALLOWED = "what the verdict allows, with the unit in the name"
+
+
+@documented
 @dataclass(frozen=True)
 class Limits:
-    """Thresholds of a verdict; angles, lost contact, friction and forces count after `settle_s`, all else always.
+    """Thresholds of a verdict; angles, lost contact, friction and forces count after `settle_s`, all else always."""
 
-    Attributes:
-        slip_m: displacement of the material corner along the table [m]; None, whatever the unit of length: `slip_rel`
-            levers from the contact to the centre of mass, but no more than the object would fall in 10 ms (0.49 mm).
-        angle_rms_deg, angle_max_deg: error of theta.
-        contact_lost_s: time in which nothing pushes on the contacts, or one of them has left the table.
-        undeclared_contact_s: time in which something else than these contacts touches the object.
-        penetration_rel: depth of the contact beyond what the soft contact explains, in levers.
-        contacts_end: contacts with the support that there have to be at the end; 0: not asked.
-        bounce_m: height that the landed face may regain, where that is asked [m].
-        force_mismatch_rel: RMS of (measured - predicted contact force) over RMS of the predicted.
-        friction_use: |f_t| / (mu f_n), measured, with the world's mu; at 1 the contact slides.
-        settle_s: what the start may take [s].
-    """
-
-    slip_m: float | None = 1e-4
-    slip_rel: float = 0.01
-    angle_rms_deg: float = 0.1
-    angle_max_deg: float = 0.2
-    contact_lost_s: float = 0.0
-    undeclared_contact_s: float = 0.0
-    penetration_rel: float = 0.01
-    contacts_end: int = 0
-    bounce_m: float = 1e-5
-    force_mismatch_rel: float = 0.05
-    friction_use: float = 0.999
-    settle_s: float = 0.1
+    slip_m: float | None = key(
+        1e-4,
+        "displacement of the contact along the support",
+        group=ALLOWED,
+        unit="m",
+        at_least=0.0,
+        none="slip_rel, but no more than the object falls in 10 ms",
+    )
+    slip_rel: float = key(
+        0.01,
+        "the same, where slip_m is not given, in levers from the contact to the centre of mass",
+        group=ALLOWED,
+        at_least=0.0,
+    )
+    angle_rms_deg: float = key(0.1, "error of the angle, RMS", group=ALLOWED, unit="deg", at_least=0.0)
+    angle_max_deg: float = key(0.2, "error of the angle, greatest", group=ALLOWED, unit="deg", at_least=0.0)
+    contact_lost_s: float = key(
+        0.0,
+        "time in which nothing pushes on the contacts, or one of them has left the support",
+        group=ALLOWED,
+        unit="s",
+        at_least=0.0,
+    )
+    undeclared_contact_s: float = key(
+        0.0,
+        "time in which something else than these contacts touches the object",
+        group=ALLOWED,
+        unit="s",
+        at_least=0.0,
+    )
+    penetration_rel: float = key(
+        0.01,
+        "depth of the contact beyond what the soft contact explains, in levers",
+        group=ALLOWED,
+        at_least=0.0,
+    )
+    contacts_end: int = key(
+        0, "contacts with the support that there have to be at the end; 0: any number", group=ALLOWED, at_least=0
+    )
+    bounce_m: float = key(
+        1e-5, "height that the landed face may regain, where contacts_end is > 0", group=ALLOWED, unit="m", at_least=0.0
+    )
+    force_mismatch_rel: float = key(
+        0.05,
+        "RMS of the measured minus the predicted contact force, over the RMS of the predicted",
+        group=ALLOWED,
+        at_least=0.0,
+    )
+    friction_use: float = key(
+        0.999, "measured |f_t| / (mu f_n), with the world's mu; at 1 the contact slides", group=ALLOWED, at_least=0.0
+    )
+    settle_s: float = key(0.1, "time that the start may take to settle", group=ALLOWED, unit="s", at_least=0.0)
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if name != "slip_m" or value is not None:
-                number(f"limits.{name}", value, at_least=0.0)
-        if not float(self.contacts_end).is_integer():
-            raise fail("limits.contacts_end", self.contacts_end, "a whole number")
+        for name, limit in declared_keys(Limits).items():
+            limit.check(f"limits.{name}", getattr(self, name))
         object.__setattr__(self, "contacts_end", int(self.contacts_end))
 
     def for_object(self, lever: float, gravity: float) -> "Limits":
@@ -70,12 +98,9 @@ class Limits:
             raise fail("limits", limits, 'Limits, or a mapping such as {"slip_m": 2e-3}')
         new: dict[str, Any] = {}
         for name, value in limits.items():
-            if name not in vars(self):
-                raise fail(f"limits.{name}", value, "a known limit: " + ", ".join(vars(self)))
-            try:
-                new[name] = float(value) if isinstance(value, str) else value
-            except ValueError:
-                raise fail(f"limits.{name}", value, "a number") from None
+            if name not in declared_keys(Limits):
+                raise fail(f"limits.{name}", value, "a known limit: " + ", ".join(declared_keys(Limits)))
+            new[name] = declared_keys(Limits)[name].read(f"limits.{name}", value)
         return replace(self, **new)
 
 

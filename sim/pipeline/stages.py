@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.controller.control_laws import Law
 from pivoting.controller.kernels.compiled_step import STATE
 
 Array = NDArray[np.float64]
@@ -140,7 +141,7 @@ class Setting(NamedTuple):
         seed, worlds, first_world: of the run; world i of a run is number first_world + i.
         dt: time step [s].
         axes: (A, 3) world axes about which the object can turn: the plane's normal, or three.
-        law, bandwidth [rad/s], damping: of the controller's law, as the scenario has them.
+        law: of the controller.
     """
 
     seed: int
@@ -148,9 +149,7 @@ class Setting(NamedTuple):
     first_world: int
     dt: float
     axes: Array
-    law: str
-    bandwidth: float
-    damping: float
+    law: Law
 
 
 class Stages(NamedTuple):

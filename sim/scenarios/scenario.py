@@ -1,7 +1,7 @@
-"""Scenarios: what a closed-loop run is made of, and the keys that change it."""
+"""Scenarios: what a closed-loop run is made of, its keys with the values that they have there, and how they change."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -11,26 +11,38 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 from pivoting.controller.control_laws import Law
-from pivoting.controller.references import Constant, MinimumJerk, Reference, Sine
+from pivoting.controller.references import REFERENCES, Reference
 from pivoting.controller.validate import Array, fail, number, one_of
 from pivoting.controller.wrench_bounds import WrenchBounds
 from pivoting.controller.wrench_problem import wrench_weight
 from pivoting.models.length_unit import POWERS
-from pivoting.models.scenes import BODY, TABLE, WORLD_KEYS, scene_path
+from pivoting.models.scenes import BODY, TABLE, scene_path
 from pivoting.sim.judging.verdict import Limits
+from pivoting.sim.scenarios.key_declaration import Key, declared_keys, documented
 from pivoting.sim.scenarios.relative_values import Load, absolute
-from pivoting.sim.scenarios.scenario_keys import BOUND_KEYS, HIDDEN_KEYS, KEYS, LOWEST, RELATIVE_KEYS, check, parsed
+from pivoting.sim.scenarios.scenario_keys import (
+    ANY_ANGLE,
+    BOUND_KEYS,
+    HIDDEN_KEYS,
+    LOWEST,
+    SCENE_KEYS,
+    ScenarioKeys,
+)
 
+_HIDDEN = tuple(f"world.{key}" for key in HIDDEN_KEYS)
 PACE = 2001  # times at which a motion is looked at, to see how far and how fast it goes
 
 
+@documented
 @dataclass(frozen=True)
-class Scenario:
+class Scenario(ScenarioKeys):
     """A closed-loop run. Angles are in degrees here and in radians everywhere else.
 
-    Keys of the world and of what the controller believes (None: as the scene's MJCF has it): mu, mass [kg], size [m],
-    incline [deg], gravity [m/s^2], and of the simulator alone: dt, timeconst [s], impedance, impratio (see
-    `models.scenes.load`). `world` holds what the simulated world really has where the controller believes otherwise.
+    The keys, which are listed last and given by name, belong to the world and to what the controller believes of it,
+    to the reference and to the controller; `world` holds what the simulated world really has where the controller
+    believes otherwise. Bounds and f_min may be relative to the weight of the object as it is believed, "0.8w", of a
+    moment with the lever from contact to CoM, of a rate per second; durations to its natural time, "3T"; see
+    `relative_values`. `absolute` resolves them.
 
     Attributes:
         name, summary: shown by `pivoting list`.
@@ -41,25 +53,9 @@ class Scenario:
         chosen: whether the object's own contact and solver parameters give way to those of the shipped scenes.
         about: "tilt" (theta lifts the object off its face) or "yaw" (with the CoM straight above the contact, theta
             turns it about the table's normal).
-        reference: "constant" (stay at theta for seconds), "arc" (theta to theta_end in seconds, at rest for hold before
-            and after), "return" (an arc and back), "sine" (theta + amplitude sin, for seconds); from Python also any
-            `Reference`, for seconds.
-        law: of `control_laws.FORMULATIONS`.  bandwidth [rad/s] (1/h of a quasi-dynamic law), damping: of the law.
-        margin: share of mu kept unused.  f_min: floor of each contact's normal force [N]; None: what keeps the contact
-            closed as it turns, see `pace`.
-        length: characteristic length of Q_w [m]; None: the lever of the contact.
-        force_max [N], moment_max [N m], force_rate [N/s], moment_rate [N m/s]: bounds on the wrench, in object axes;
-            None: none.
-        plan_hz: how often a horizon is planned, which the per-step law then follows; None: the law follows the
-            reference itself.  plan_steps, plan_step [s], integrator: of the horizon, see `controller.Horizon`.
-        track: what a pose error of one radian, or one lever, costs in a plan's step, in squares of the weight.
-        spread: each world starts off the reference by up to this angle [deg], drawn from the seed.
+        world: values by key of the object that the simulated world alone has.
         limits: the thresholds of the verdict.
         given: what was set with `change`, as the command line spells it.
-
-    Bounds and f_min may be relative to the weight of the object as it is believed, "0.8w", of a moment with the lever
-    from contact to CoM, of a rate per second; and seconds, hold, period and plan_step to its natural time, "3T"; see
-    `relative`. `absolute` resolves them.
     """
 
     name: str
@@ -70,38 +66,6 @@ class Scenario:
     contact: str | ArrayLike = "corner"
     chosen: bool = False
     about: str = "tilt"
-    reference: str | Reference = "constant"
-    theta: float = 30.0
-    theta_end: float = 80.0
-    seconds: float | str = 10.0
-    hold: float | str = 0.25
-    amplitude: float = 5.0
-    period: float | str = 2.0
-    law: str = "dynamic"
-    bandwidth: float = 40.0
-    damping: float = 1.0
-    margin: float = 1.0 / 6.0
-    f_min: float | str | None = 0.0
-    length: float | None = None
-    force_max: float | str | None = None
-    moment_max: float | str | None = None
-    force_rate: float | str | None = None
-    moment_rate: float | str | None = None
-    plan_hz: float | None = None
-    plan_steps: int = 20
-    plan_step: float | str = 0.02
-    integrator: str = "semi-implicit"
-    track: float = 1e4
-    spread: float = 0.01
-    mu: float | None = None
-    mass: float | None = None
-    size: float | None = None
-    incline: float | None = None
-    gravity: float | None = None
-    dt: float | None = None
-    timeconst: float | None = None
-    impedance: float | None = None
-    impratio: float | None = None
     world: Mapping[str, float] = field(default_factory=dict)
     limits: Limits = field(default_factory=Limits)
     given: frozenset[str] = field(default=frozenset(), compare=False)
@@ -113,26 +77,37 @@ class Scenario:
             raise fail("limits", self.limits, "Limits")
         one_of("about", self.about, ("tilt", "yaw"))
         corner = isinstance(self.contact, str) and self.contact == "corner"
-        for key in KEYS:
-            value = getattr(self, key)
-            if key in ("theta", "theta_end") and not corner:  # what an object allows, its plan knows
-                check(key, value, at_least=-360.0, at_most=360.0)
-            elif key != "reference" or isinstance(value, str) or not callable(value):
-                check(key, value)
+        for name, key in self._keys.items():
+            turned = name in ("theta", "theta_end") and not corner  # what an object allows, its plan knows
+            key.check(name, getattr(self, name), **(ANY_ANGLE if turned else {}))
         object.__setattr__(self, "world", MappingProxyType(dict(self.world)))
-        for key, value in self.world.items():
-            if key not in HIDDEN_KEYS:
-                raise fail(f"world.{key}", value, "one of " + ", ".join(f"world.{k}" for k in HIDDEN_KEYS))
-            check(key, value, "world.")
+        for name, value in self.world.items():
+            self._hidden(name, value).check(f"world.{name}", value)
         if not isinstance(self.scene, str):
             object.__setattr__(self, "scene", Path(self.scene))
-        swing = self.amplitude if self.reference == "sine" else 0.0
+        swing = self.amplitude if "amplitude" in self.reference_keys else 0.0
         if corner and not LOWEST <= self.theta - swing <= self.theta + swing <= 90.0 - LOWEST:
             raise fail("amplitude", swing, f"such that the block stays on its corner about theta = {self.theta:g} deg")
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle, which takes no read-only mapping."""
-        return partial(Scenario, **{**vars(self), "world": dict(self.world)}), ()
+        return partial(type(self), **{**vars(self), "world": dict(self.world)}), ()
+
+    @property
+    def _keys(self) -> Mapping[str, Key]:
+        """As they are declared, those of a subclass among them."""
+        return declared_keys(type(self))
+
+    def _hidden(self, name: str, value: Any) -> Key:
+        """The key world.NAME, which has this value."""
+        if name not in HIDDEN_KEYS:
+            raise fail(f"world.{name}", value, "one of " + ", ".join(_HIDDEN))
+        return self._keys[name]
+
+    @property
+    def own(self) -> bool:
+        """Whether the object is of a user's own file, and not of a scene of this package."""
+        return not isinstance(self.scene, str)
 
     @property
     def path(self) -> Path:
@@ -142,7 +117,7 @@ class Scenario:
     @property
     def believed(self) -> dict[str, float]:
         """Changes to the scene that the controller knows of."""
-        return {key: getattr(self, key) for key in WORLD_KEYS if getattr(self, key) is not None}
+        return {key: getattr(self, key) for key in SCENE_KEYS if getattr(self, key) is not None}
 
     @property
     def actual(self) -> dict[str, float]:
@@ -150,17 +125,18 @@ class Scenario:
         return {**self.believed, **self.world}
 
     @property
+    def reference_keys(self) -> tuple[str, ...]:
+        """The keys that the reference is made of; none, if it is not asked for by name."""
+        return REFERENCES[self.reference].keys if isinstance(self.reference, str) else ()
+
+    @property
     def motion(self) -> Reference:
         """The reference of a scenario that is `absolute`, in radians."""
         if not isinstance(self.reference, str):
             return self.reference
-        start, end = np.deg2rad(self.theta), np.deg2rad(self.theta_end)
-        if self.reference == "constant":
-            return Constant(start)
-        if self.reference == "sine":
-            return Sine(start, np.deg2rad(self.amplitude), self._number("period"))
-        points = (start, end, start) if self.reference == "return" else (start, end)
-        return MinimumJerk(points, self._number("seconds"), self._number("hold"))
+        values = {key: self._number(key) for key in self.reference_keys}
+        in_radians = {key: np.deg2rad(value) for key, value in values.items() if self._keys[key].unit == "deg"}
+        return REFERENCES[self.reference].make(**{**values, **in_radians})
 
     @property
     def duration(self) -> float:
@@ -173,13 +149,13 @@ class Scenario:
         """What was set, and what else differs from the shipped scenario of this name, or else from the defaults."""
         from pivoting.sim.scenarios.shipped_scenarios import shipped  # which are made of this
 
-        then = (shipped(self) or Scenario(self.name, self.summary, self.scene))._values
+        then = (shipped(self) or type(self)(self.name, self.summary, self.scene))._values
         return {k: value for k, value in self._values.items() if k in self.given or k not in then or then[k] != value}
 
     @property
     def _values(self) -> dict[str, Any]:
         """By key of the command line; limits of the verdict as limit.KEY."""
-        plain = {key: getattr(self, key) for key in KEYS}
+        plain = {key: getattr(self, key) for key in self._keys}
         if not isinstance(self.reference, str):
             plain["reference"] = type(self.reference).__name__
         hidden = {f"world.{key}": value for key, value in self.world.items()}
@@ -192,8 +168,8 @@ class Scenario:
 
     @property
     def stages(self) -> dict[str, float]:
-        """The values of the keys that ask for a stage, by the place of its class."""
-        return {}
+        """The values of the keys that ask for a stage of the pipeline, by the place of its class."""
+        return {key.stage: getattr(self, name) for name, key in self._keys.items() if key.stage is not None}
 
     def control_law(self) -> Law:
         """The law; the quasi-dynamic ones take the time constant of `bandwidth` as their step h."""
@@ -213,10 +189,11 @@ class Scenario:
 
     def resolved(self, of: Load) -> dict[str, Any]:
         """What is relative, by key, in the key's own unit."""
-        given = {key: getattr(self, key) for key in RELATIVE_KEYS if isinstance(getattr(self, key), str)}
+        given = {name: getattr(self, name) for name, key in self._keys.items() if key.relative}
         return {
-            key: absolute(key, value, KEYS[key].relative, of, KEYS[key].unit, KEYS[key].limits)
-            for key, value in given.items()
+            name: absolute(name, value, self._keys[name].relative, of, self._keys[name].unit, self._keys[name].limits)
+            for name, value in given.items()
+            if isinstance(value, str)
         }
 
     @property
@@ -245,7 +222,7 @@ class Scenario:
             unit: of the model's lengths [m], in which the bounds are then.
         """
         given = {
-            key: self._number(key) / unit ** POWERS[KEYS[key].unit]
+            key: self._number(key) / unit ** POWERS[self._keys[key].unit]
             for key in BOUND_KEYS
             if getattr(self, key) is not None
         }
@@ -253,7 +230,7 @@ class Scenario:
 
     def _number(self, key: str) -> float:
         """A value that is no longer relative."""
-        return number(key, getattr(self, key), unit=KEYS[key].unit)
+        return number(key, getattr(self, key), unit=self._keys[key].unit)
 
     def wrench_weight(self, dim: int, unit: float = 1.0) -> Array | None:
         """Q_w of the characteristic length, in a model's `unit` of length [m], or None for the controller's own."""
@@ -266,7 +243,7 @@ class Scenario:
         some) sets the verdict's.
 
         Raises:
-            ValueError: an unknown key or a value out of range; it is named.
+            ValueError: an unknown key, a value out of range, or a key that has no effect; it is named.
         """
         limits = overrides.pop("limits", {})
         plain = {key: value for key, value in overrides.items() if not key.startswith("world.") and key != "world"}
@@ -276,14 +253,34 @@ class Scenario:
         hidden = dict(given)
         hidden.update({key[6:]: value for key, value in overrides.items() if key.startswith("world.")})
         for key, value in plain.items():
-            if key not in KEYS:
-                raise fail(key, value, "a known key: " + ", ".join(KEYS) + ", world." + ", world.".join(HIDDEN_KEYS))
-            plain[key] = parsed(key, value)
+            if key not in self._keys:
+                raise fail(key, value, "a known key: " + ", ".join((*self._keys, *_HIDDEN)))
+            plain[key] = self._keys[key].read(key, value)
         kept = {key: value for key, value in self.world.items() if key not in plain}
-        world = {**kept, **{key: parsed(key, value, "world.") for key, value in hidden.items()}}
+        hidden = {key: self._hidden(key, value).read(f"world.{key}", value) for key, value in hidden.items()}
         names = {
             *plain,
             *(f"world.{key}" for key in hidden),
             *(f"limit.{key}" for key in (limits if isinstance(limits, Mapping) else ())),
         }
-        return replace(self, **plain, world=world, limits=self.limits.change(limits), given=self.given | names)
+        new = replace(
+            self, **plain, world={**kept, **hidden}, limits=self.limits.change(limits), given=self.given | names
+        )
+        new.refuse_without_effect(plain)
+        return new
+
+    def refuse_without_effect(self, keys: Iterable[str], open_loop: bool = True) -> None:
+        """Raise if one of some `keys` that were set has no effect beside the others.
+
+        Args:
+            open_loop: whether the run is in open loop, where a plan is made without plan_hz; True also where that is
+                not known.
+
+        Raises:
+            ValueError: the reference, the law or the planning that there is takes no notice of a key; it is named.
+        """
+        asked = set(keys)
+        for name, key in self._keys.items():
+            needs = key.needs
+            if name in asked and needs is not None and not needs.met(name, self, open_loop):
+                raise fail(name, getattr(self, name), f"left out: it has no effect unless {needs.condition(name)}")

@@ -9,6 +9,8 @@ from pivoting.controller.validate import fail
 from pivoting.sim.judging.verdict import Limits
 from pivoting.sim.scenarios.scenario import Scenario
 
+OWN = "pivot"  # the name of the scenario of an object of your own
+
 
 def own_object(
     model: str | os.PathLike[str],
@@ -28,7 +30,7 @@ def own_object(
         chosen: simulate it with the contact and solver parameters of the shipped scenes (`models/settings.xml`).
     """
     return Scenario(
-        "pivot",
+        OWN,
         f"{body} of {Path(model).name} about its {contact if isinstance(contact, str) else 'given contact'}",
         scene=Path(model),
         body=body,
@@ -46,7 +48,7 @@ def own_object(
 
 def shipped(case: Scenario) -> Scenario | None:
     """The scenario that `case` was before anything was changed, if it is not one of your own making."""
-    if case.name == "pivot" and not isinstance(case.scene, str):
+    if case.own:
         return own_object(case.scene, case.body)
     return SCENARIOS.get(case.name)
 
@@ -54,7 +56,7 @@ def shipped(case: Scenario) -> Scenario | None:
 def scenario(name: str) -> Scenario:
     """The shipped scenario of that name."""
     if name not in SCENARIOS:
-        raise fail("scenario", name, "one of " + ", ".join(SCENARIOS) + ", or pivot with a model")
+        raise fail("scenario", name, "one of " + ", ".join(SCENARIOS) + f", or {OWN} with a model")
     return SCENARIOS[name]
 
 
