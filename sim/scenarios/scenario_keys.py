@@ -226,6 +226,16 @@ class ScenarioKeys:
         needs=_PLANS_OR_PLAYS,
     )
 
+    noise: float = key(
+        0.0,
+        "greatest error of the measured orientation about each axis, drawn anew in each step",
+        group=STAGES,
+        unit="deg",
+        at_least=0.0,
+        at_most=10.0,
+        stage="pivoting.sim.pipeline.measurement_noise:MeasurementNoise",
+    )
+
     dt: float | None = key(
         None,
         "time step",
