@@ -236,6 +236,17 @@ class ScenarioKeys:
         stage="pivoting.sim.pipeline.measurement_noise:MeasurementNoise",
     )
 
+    integral: float = key(
+        0.0,
+        "rate at which integral action removes a steady error of the angle",
+        group=STAGES,
+        unit="1/s",
+        at_least=0.0,
+        at_most=1e5,
+        needs=Needs("law", ("dynamic",)),
+        stage="pivoting.sim.pipeline.integral_action:IntegralAction",
+    )
+
     dt: float | None = key(
         None,
         "time step",

@@ -1,0 +1,42 @@
+"""Integral action: what remains of the angle error is summed up and added to the acceleration that the law asks for."""
+
+import numpy as np
+from pivoting.controller.rotations import CONJUGATE, quaternion_product
+from pivoting.controller.validate import fail
+from pivoting.sim.pipeline.stages import Desired, Setting, States
+
+
+class IntegralAction:
+    """The third term of a PID law: kp rate times the integral of the orientation error, world axes.
+
+    Without it a constant disturbance, such as a mass that is not as believed, leaves a constant error. By Routh's
+    criterion the closed loop s^3 + kd s^2 + kp s + kp rate is stable for a rate below kd, see `Law`.
+
+    Args:
+        rate: at which a steady error is removed [1/s].
+
+    Raises:
+        ValueError: the law asks for no acceleration, or the loop would not be stable.
+    """
+
+    slot = "correct"
+
+    def __init__(self, rate: float, setting: Setting):
+        law = setting.law
+        if not law.feedforward:
+            raise fail("integral", rate, f"0 with law={law.formulation}, which follows no acceleration; or law=dynamic")
+        if rate >= law.kd:
+            raise fail("integral", rate, f"< 2 damping bandwidth = {law.kd:g} 1/s, or the loop is not stable")
+        self._gain, self._dt = rate * law.kp, setting.dt
+        self._integral = np.zeros((setting.worlds, 3))
+
+    def __call__(self, states: States, desired: Desired) -> Desired:
+        """The reference with the integral of the error, up to this step, in its acceleration."""
+        turned = quaternion_product(desired.orientation, states.orientation * CONJUGATE)
+        turned *= np.where(turned[:, :1] < 0.0, -1.0, 1.0)  # the shorter way round
+        sine = np.linalg.norm(turned[:, 1:], axis=1, keepdims=True)
+        scale = 2.0 * np.arctan2(sine, turned[:, :1]) / np.where(sine > 0.0, sine, 1.0)
+        self._integral += self._dt * scale * turned[:, 1:]
+        W = len(states.values)
+        orientation, velocity, acceleration = (np.broadcast_to(v, (W, v.shape[1])).copy() for v in desired)
+        return Desired(orientation, velocity, acceleration + self._gain * self._integral)
