@@ -51,8 +51,10 @@ def start_worlds(batch: Batch, world: World, desired: Samples, errors: Array, de
     data, up, point = initial_data(model), matrix(body.table)[:, 2], there.contacts[0]
     depth = min(depth or START_DEPTH * there.lever, DEEPEST * there.lever)
     kind, floats = int(mujoco.mjtState.mjSTATE_INTEGRATION), 0.0
-    state = np.empty(mujoco.mj_stateSize(model, kind))
+    state, begun = (np.empty(mujoco.mj_stateSize(model, kind)) for _ in range(2))
+    mujoco.mj_getState(model, data, begun, kind)
     for row, error in zip(batch.state, errors, strict=True):
+        mujoco.mj_setState(model, data, begun, kind)  # whatever other worlds there are, to the last bit
         for _ in range(2):  # a contact with a margin holds the body above the table: how far, only MuJoCo knows
             at = there.at + (there.radius[0] + floats - depth) * up
             place(model, data, body, quaternion_product(exponential(error * there.axis), desired[0][0]), point, at)
