@@ -1,7 +1,7 @@
 from .conic import ClarabelWorkspace as ClarabelWorkspace
 from .contacts import Contact as Contact
 from .control_laws import Body as Body, Law as Law
-from .plane_and_space import Motion as Motion
+from .motion import Motion as Motion
 from .planning.horizon import BodyState as BodyState, Horizon as Horizon
 from .planning.receding_horizon import RecedingHorizon as RecedingHorizon
 from .planning.sequential_convex import Plan as Plan, PlanError as PlanError, Planner as Planner

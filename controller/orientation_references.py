@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.plane_and_space import Motion
+from pivoting.controller.motion import Motion
 from pivoting.controller.references import MinimumJerk, Reference
 from pivoting.controller.rotations import exponential, quaternion_product, rotation_error, rotation_matrix
 from pivoting.controller.validate import Array, array, fail, number, unit_quaternions

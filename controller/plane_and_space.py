@@ -7,25 +7,13 @@ Planar coordinates are (x right, z up), the angle theta counter-clockwise, that 
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pivoting.controller.kernels.compilation import subroutine
+from pivoting.controller.motion import Motion
 from pivoting.controller.rotations import CONJUGATE, IDENTITY, quaternion_product, rotation_matrix
 from pivoting.controller.validate import Array, array, fail, unit_quaternions
-
-
-class Motion(NamedTuple):
-    """An orientation and how it changes: a measured state or a point of a reference.
-
-    Plane: angle theta [rad], its rate [rad/s] and acceleration [rad/s^2], as floats.
-    Space: unit quaternion (w, x, y, z) object to world, angular velocity and acceleration (3,) in world axes.
-    """
-
-    orientation: float | ArrayLike
-    velocity: float | ArrayLike = 0.0
-    acceleration: float | ArrayLike = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.plane_and_space import Motion
+from pivoting.controller.motion import Motion
 from pivoting.controller.validate import array, fail, number
 
 

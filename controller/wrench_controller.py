@@ -14,7 +14,8 @@ from pivoting.controller.contacts import Contact
 from pivoting.controller.control_laws import Body, Law
 from pivoting.controller.kernels.compiled_step import Belief, state_problem
 from pivoting.controller.kernels.workspace import workspace
-from pivoting.controller.plane_and_space import Motion, Space, space
+from pivoting.controller.motion import Motion
+from pivoting.controller.plane_and_space import Space, space
 from pivoting.controller.rotations import IDENTITY, rotation_matrix
 from pivoting.controller.units import Units, lever, units
 from pivoting.controller.validate import Array, array, fail, number, positive_definite

@@ -5,11 +5,11 @@ from collections.abc import Iterable
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
+from pivoting.models.mujoco_constants import LEAST_FRICTION
 from pivoting.models.names import ModelError, label
 from pivoting.models.placement.convex_hull import body_size, ellipsoids
 from pivoting.models.support_surfaces import can_collide
 
-LEAST = 1e-5  # MuJoCo's own least friction, mjMINMU: a coefficient of 0 counts as this
 EDGE = 65  # points along an edge at which rims and round ends are looked for
 NEAR = 1e-3  # of the body's size: a geom whose surface is closer to a contact point carries it
 
@@ -31,7 +31,7 @@ def contact_friction(model: mujoco.MjModel, one: int, other: int) -> tuple[int, 
         condim, tangents = int(model.geom_condim[first]), (float(model.geom_friction[first, 0]),) * 2
     if model.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
         tangents = float(model.opt.o_friction[0]), float(model.opt.o_friction[1])
-    return condim, (max(tangents[0], LEAST), max(tangents[1], LEAST))
+    return condim, (max(tangents[0], LEAST_FRICTION), max(tangents[1], LEAST_FRICTION))
 
 
 def read_friction(model: mujoco.MjModel, body: int, support: int, points: ArrayLike | None = None) -> float:
@@ -55,7 +55,7 @@ def read_friction(model: mujoco.MjModel, body: int, support: int, points: ArrayL
     there = [] if points is None else _near(model, meeting, np.atleast_2d(np.asarray(points, dtype=float)))
     found = {geom: contact_friction(model, geom, support) for geom in there or meeting}
     for geom, (condim, tangents) in found.items():
-        if condim == 1 or max(tangents) <= LEAST:
+        if condim == 1 or max(tangents) <= LEAST_FRICTION:
             why = "condim 1" if condim == 1 else "friction 0"
             touches = f"{label(model, geom)} touches {label(model, support)} without friction ({why})"
             raise ModelError(f"{touches}, and nothing sticks; give both geoms condim 3 and friction")

@@ -7,7 +7,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from pivoting.models.friction_coefficient import LEAST
+from pivoting.models.mujoco_constants import LEAST_FRICTION
 from pivoting.models.names import ModelError
 
 INERTIA_FROM_GEOM = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
@@ -90,9 +90,9 @@ def _incline(edit: Edit, incline: float) -> None:
 
 def _friction(edit: Edit, mu: float) -> None:
     """The sliding friction of the body and its support."""
-    if mu <= LEAST:
+    if mu <= LEAST_FRICTION:
         raise ModelError(
-            f"mu = {mu:g}: must be > {LEAST:g}, which is the least friction coefficient that MuJoCo simulates"
+            f"mu = {mu:g}: must be > {LEAST_FRICTION:g}, which is the least friction coefficient that MuJoCo simulates"
         )
     for part in edit.parts:
         part.friction[: 2 if isinstance(part, mujoco.MjsPair) else 1] = mu

@@ -15,16 +15,11 @@ from pivoting.models.length_unit import length_unit
 from pivoting.models.names import ModelError, body_id, body_name
 from pivoting.models.rigid_body import FILE_FRAME, degrees_of_freedom, initial_data
 from pivoting.models.scene_changes import CHANGES, Edit
+from pivoting.models.shipped_files import BODY, TABLE, scene_path
 from pivoting.models.solver_settings import choose
 from pivoting.models.support_surfaces import find_support
 
-BODY, TABLE = "block", "table"  # names in the scenes
 WORLD_KEYS = tuple(CHANGES)
-
-
-def scene_path(name: str) -> Path:
-    """The MJCF file of a scene of this package."""
-    return Path(__file__).parent / f"{name}.xml"
 
 
 @dataclass(frozen=True, eq=False)

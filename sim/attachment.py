@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from pivoting.controller.contacts import Contact
 from pivoting.controller.control_laws import Body, Law
 from pivoting.controller.kernels.compiled_step import world_wrench
-from pivoting.controller.plane_and_space import Motion
+from pivoting.controller.motion import Motion
 from pivoting.controller.rotations import quaternion_product
 from pivoting.controller.solution import Solution
 from pivoting.controller.solvers import solve

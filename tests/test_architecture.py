@@ -1,7 +1,10 @@
 """The rooms: who may import whom, how long a file may be, and that what is declared is what is used."""
 
 import ast
+import subprocess
+import sys
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -61,8 +64,6 @@ def test_what_is_imported_is_declared() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     declared = {line.split(">")[0].split("=")[0].split("<")[0].strip() for line in project["dependencies"]}
     packages = {"rerun": "rerun-sdk", "mpl_toolkits": "matplotlib"}
-    import sys
-
     for path in FILES:
         for name in imported(path):
             top = name.split(".")[0]
@@ -71,9 +72,44 @@ def test_what_is_imported_is_declared() -> None:
 
 
 def test_importing_the_mathematics_does_not_import_the_simulator() -> None:
-    import subprocess
-    import sys
-
     code = "import sys, pivoting.controller; print([m for m in ('mujoco', 'rerun', 'matplotlib') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("module", ["pivoting", "pivoting.sim", "pivoting.sim.console.scenario_tables"])
+def test_what_answers_at_once_imports_neither_compiler_nor_simulator(module: str) -> None:
+    code = f"import sys, {module}; print([m for m in ('numba', 'mujoco', 'scipy', 'rerun') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def public_classes() -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for path in FILES:
+        for node in ast.parse(path.read_text()).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found.setdefault(node.name, []).append(str(path.relative_to(ROOT)))
+    return found
+
+
+def test_no_two_public_classes_share_a_name() -> None:
+    assert {name: where for name, where in public_classes().items() if len(where) > 1} == {}
+
+
+def functions(path: Path) -> Iterator[tuple[str, int, int, bool]]:
+    """Name, lines, positional arguments but for self, and whether it is compiled, of every function."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.FunctionDef):
+            names = [argument.arg for argument in (*node.args.posonlyargs, *node.args.args)]
+            compiled = {decorator.id for decorator in node.decorator_list if isinstance(decorator, ast.Name)}
+            lines = (node.end_lineno or node.lineno) - node.lineno + 1
+            own = names[0] in ("self", "cls") if names else False
+            yield node.name, lines, len(names) - own, bool(compiled & {"kernel", "subroutine"})
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_functions_are_short_and_take_few_arguments(path: Path) -> None:
+    for name, lines, arguments, compiled in functions(path):
+        assert lines <= (80 if compiled else 60), name
+        assert arguments <= (12 if compiled else 8), name

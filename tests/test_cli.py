@@ -145,7 +145,7 @@ def test_a_fault_of_ours_is_not_called_a_wrong_use(monkeypatch: pytest.MonkeyPat
     def broken(console: object) -> None:
         np.zeros(2) + np.zeros(3)
 
-    monkeypatch.setattr("pivoting.sim.console.tables.print_scenarios", broken)
+    monkeypatch.setattr("pivoting.sim.console.scenario_tables.print_scenarios", broken)
     monkeypatch.setattr(sys, "argv", ["pivoting", "list"])
     with pytest.raises(ValueError, match="broadcast"):
         main()

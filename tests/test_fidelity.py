@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from pivoting.models.contact_softness import read_rows
 from pivoting.sim import Run, own_object, simulate
-from pivoting.sim.console.tables import jsonable, print_run
+from pivoting.sim.console.json_values import jsonable
+from pivoting.sim.console.run_tables import print_run
 from pivoting.sim.judging.measures import predicted_slip, slip_floor_unknown
 from rich.console import Console
 

@@ -13,7 +13,7 @@ from pivoting.models import ModelError, load, scene_path
 from pivoting.models.scenes import WORLD_KEYS
 from pivoting.sim import SCENARIOS, Limits, Scenario, own_object, simulate
 from pivoting.sim.console.command_line import cli
-from pivoting.sim.console.tables import key_help
+from pivoting.sim.console.scenario_tables import key_help
 from pivoting.sim.scenarios.key_declaration import Needs, declared_keys, described, documented, key
 from pivoting.sim.scenarios.scenario_keys import CONTROL_KEYS, HIDDEN_KEYS, KEYS, SCENE_KEYS
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pivoting.models.length_unit import length_unit
 from pivoting.sim import Run, simulate
-from pivoting.sim.console.tables import print_run
+from pivoting.sim.console.run_tables import print_run
 from rich.console import Console
 
 from tests.own_files import QUICK, own

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from pivoting.sim import Run, own_object, simulate
-from pivoting.sim.console.tables import print_run
+from pivoting.sim.console.run_tables import print_run
 from rich.console import Console
 
 BOX = """<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1"/><body name="box" pos="0 0 .1"><freejoint/>

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 from pivoting.sim import SCENARIOS, Run, own_object, simulate
+from pivoting.sim.console.json_values import jsonable
 from pivoting.sim.console.output_files import save, stem
-from pivoting.sim.console.tables import jsonable
 from pivoting.sim.drawing.rerun_recording import RecordingOffError, record
 from rerun.chunk import RrdReader
 

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pivoting.controller.plane_and_space import Motion, space, tilt
+from pivoting.controller.motion import Motion
+from pivoting.controller.plane_and_space import space, tilt
 from pivoting.controller.rotations import quaternion_product, rotation_error, rotation_matrix
 
 unit = st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 0.1)

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 from pivoting.controller.contacts import fill_jacobian
-from pivoting.controller.control_laws import fill_required
 from pivoting.controller.kernels.compilation import kernel
 from pivoting.controller.kernels.interior_point import contact_wrench
 from pivoting.controller.kernels.planar_closed_form import planar_wrench
+from pivoting.controller.kernels.required_wrench import fill_required
 from pivoting.controller.rotations import fill_rotation, turned
 from pivoting.controller.solution import FAILED, INACCURATE, SOLVED
 from pivoting.controller.validate import Array

@@ -31,8 +31,6 @@ from pivoting.controller.rotations import (
 from pivoting.controller.units import Units
 from pivoting.controller.validate import Array
 
-INTEGRATORS = {"quasi-dynamic": (1, 0), "implicit": (2, 0), "semi-implicit": (2, 1), "forward": (2, 2)}  # order, lag
-
 
 class Path(NamedTuple):
     """Poses 0 to N, in table axes, and what came before them.

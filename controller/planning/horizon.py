@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 from pivoting.controller.friction_pyramid import polygon
-from pivoting.controller.planning.equations_of_motion import INTEGRATORS, Path, fill_start
+from pivoting.controller.planning.equations_of_motion import Path, fill_start
+from pivoting.controller.planning.integrators import INTEGRATORS
 from pivoting.controller.rotations import CONJUGATE, quaternion_product, rotated, rotation_matrix
 from pivoting.controller.validate import Array, array, fail, number, one_of, positive_definite, unit_quaternions
 from pivoting.controller.wrench_bounds import WrenchBounds

@@ -11,7 +11,7 @@ from pivoting.controller.cone_constraints import friction_limits, wrench_limits
 from pivoting.controller.conic_program import Cones, ConicProgram
 from pivoting.controller.mobility import fixed_pairs
 from pivoting.controller.planning.block_matrix import BlockMatrix, Indices, Part
-from pivoting.controller.planning.equations_of_motion import INTEGRATORS, Mechanics, Path, Scratch
+from pivoting.controller.planning.equations_of_motion import Mechanics, Path, Scratch
 from pivoting.controller.planning.horizon import Horizon
 from pivoting.controller.planning.horizon_rows import (
     Rows,
@@ -21,6 +21,7 @@ from pivoting.controller.planning.horizon_rows import (
     fill_sides,
     fill_tracking,
 )
+from pivoting.controller.planning.integrators import INTEGRATORS
 from pivoting.controller.rotations import exponential
 from pivoting.controller.validate import Array
 

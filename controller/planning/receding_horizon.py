@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 from pivoting.controller.kernels.compilation import kernel
-from pivoting.controller.planning.equations_of_motion import INTEGRATORS
 from pivoting.controller.planning.horizon import BodyState
+from pivoting.controller.planning.integrators import INTEGRATORS
 from pivoting.controller.planning.sequential_convex import Plan, Planner
 from pivoting.controller.rotations import fill_rotation, into, quaternion_product, turn
 from pivoting.controller.validate import Array, fail

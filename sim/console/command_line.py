@@ -30,7 +30,8 @@ def cli() -> None:
 def example(as_json: JsonOutput | None, figure: Path | None) -> int:
     """Solve the notes' worked example by every method; exit 0 if all printed digits agree."""
     from pivoting.controller.worked_example import EXAMPLES, compare_all
-    from pivoting.sim.console.tables import jsonable, print_examples
+    from pivoting.sim.console.example_tables import print_examples
+    from pivoting.sim.console.json_values import jsonable
 
     if figure is not None:
         _check_figure(figure)
@@ -71,7 +72,7 @@ def example(as_json: JsonOutput | None, figure: Path | None) -> int:
 @cli.command("list")
 def list_scenarios() -> int:
     """The scenarios, a line each."""
-    from pivoting.sim.console.tables import print_scenarios
+    from pivoting.sim.console.scenario_tables import print_scenarios
 
     print_scenarios(console())
     return 0
@@ -82,7 +83,7 @@ class _RunCommand(click.Command):
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Called by click last of all."""
-        from pivoting.sim.console.tables import key_help
+        from pivoting.sim.console.scenario_tables import key_help
 
         for title, rows in key_help():
             with formatter.section(title):
@@ -148,7 +149,8 @@ def run(
     with _progress(f"{scenario}, {worlds} world{'s' * (worlds > 1)}") as report:
         finished = simulate(case, worlds, seed, progress=report, open_loop=open_loop)
 
-    from pivoting.sim.console.tables import jsonable, print_run
+    from pivoting.sim.console.json_values import jsonable
+    from pivoting.sim.console.run_tables import print_run
 
     also: dict[str, Any] = {}
     if finished.verdict == "fail" and not open_loop:

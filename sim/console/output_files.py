@@ -12,7 +12,7 @@ from threading import current_thread, main_thread
 from typing import Any, NamedTuple
 
 import numpy as np
-from pivoting.sim.console.tables import jsonable
+from pivoting.sim.console.json_values import jsonable
 from pivoting.sim.drawing.rerun_recording import RecordingOffError, record
 from pivoting.sim.run import Run
 from pivoting.sim.scenarios.scenario import Scenario

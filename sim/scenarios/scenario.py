@@ -6,17 +6,15 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pivoting.controller.control_laws import Law
 from pivoting.controller.references import REFERENCES, Reference
 from pivoting.controller.validate import Array, fail, number, one_of
-from pivoting.controller.wrench_bounds import WrenchBounds
-from pivoting.controller.wrench_problem import wrench_weight
 from pivoting.models.length_unit import POWERS
-from pivoting.models.scenes import BODY, TABLE, scene_path
+from pivoting.models.shipped_files import BODY, TABLE, scene_path
 from pivoting.sim.judging.verdict import Limits
 from pivoting.sim.scenarios.key_declaration import Key, declared_keys, documented
 from pivoting.sim.scenarios.relative_values import Load, absolute
@@ -28,6 +26,9 @@ from pivoting.sim.scenarios.scenario_keys import (
     SCENE_KEYS,
     ScenarioKeys,
 )
+
+if TYPE_CHECKING:  # what is compiled is imported when it is needed: a list of scenarios needs none of it
+    from pivoting.controller.wrench_bounds import WrenchBounds
 
 _HIDDEN = tuple(f"world.{key}" for key in HIDDEN_KEYS)
 PACE = 2001  # times at which a motion is looked at, to see how far and how fast it goes
@@ -215,7 +216,7 @@ class Scenario(ScenarioKeys):
                 raise fail("reference", f"{name} of shape {values.shape}", allowed)
         return angle, rate, acceleration
 
-    def bounds(self, unit: float = 1.0) -> WrenchBounds:
+    def bounds(self, unit: float = 1.0) -> "WrenchBounds":
         """On the wrench, of a scenario that is `absolute`; without any, one that bounds nothing.
 
         Args:
@@ -226,6 +227,8 @@ class Scenario(ScenarioKeys):
             for key in BOUND_KEYS
             if getattr(self, key) is not None
         }
+        from pivoting.controller.wrench_bounds import WrenchBounds
+
         return WrenchBounds(**{key.removesuffix("_max"): value for key, value in given.items()})
 
     def _number(self, key: str) -> float:
@@ -234,6 +237,8 @@ class Scenario(ScenarioKeys):
 
     def wrench_weight(self, dim: int, unit: float = 1.0) -> Array | None:
         """Q_w of the characteristic length, in a model's `unit` of length [m], or None for the controller's own."""
+        from pivoting.controller.wrench_problem import wrench_weight
+
         return None if self.length is None else wrench_weight(dim, self.length / unit)
 
     def change(self, **overrides: Any) -> "Scenario":

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 from pivoting.controller.control_laws import FORMULATIONS
-from pivoting.controller.planning.equations_of_motion import INTEGRATORS
+from pivoting.controller.planning.integrators import INTEGRATORS
 from pivoting.controller.references import REFERENCES, Reference
-from pivoting.models.friction_coefficient import LEAST
+from pivoting.models.mujoco_constants import LEAST_FRICTION
 from pivoting.sim.scenarios.key_declaration import Needs, declared_keys, key
 
 LOWEST = 0.1  # [deg] from a face: closer, the next corner touches the table too
@@ -39,7 +39,7 @@ class ScenarioKeys:
 
     mu: float | None = key(
         None,
-        f"friction coefficient between the object and its support (MuJoCo needs more than {LEAST:g})",
+        f"friction coefficient between the object and its support (MuJoCo needs more than {LEAST_FRICTION:g})",
         group=OBJECT,
         above=0.0,
         at_most=10.0,

@@ -1,17 +1,12 @@
-"""What people read: tables of a run, of the scenarios and of the worked example."""
+"""What people read of a run: what it was, the table of its verdict, times, reasons and events."""
 
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from pivoting.controller.solution import Solution
-from pivoting.controller.worked_example import EXAMPLES, Digit
 from pivoting.models.length_unit import NAMES
-from pivoting.sim.judging.verdict import Limits
 from pivoting.sim.run import Run
-from pivoting.sim.scenarios.key_declaration import declared_keys, described
-from pivoting.sim.scenarios.scenario import Scenario
-from pivoting.sim.scenarios.shipped_scenarios import OWN, SCENARIOS
+from pivoting.sim.scenarios.key_declaration import declared_keys
 from rich.console import Console
 from rich.table import Table
 
@@ -44,8 +39,17 @@ _LINES = {
 
 
 def print_run(console: Console, run: Run) -> None:
-    """The verdict table of a run."""
+    """What was run, the table of its verdict, and what there is to say of it."""
     summary = run.summary()
+    _print_scenario(console, run, summary)
+    console.print(_verdict_table(run, summary))
+    _print_verdict(console, run, summary)
+    _print_times(console, run, summary)
+    _print_notes(console, run, summary)
+
+
+def _print_scenario(console: Console, run: Run, summary: Mapping[str, Any]) -> None:
+    """The scenario and what was read of the object."""
     console.print(f"[bold]{run.scenario.label}[/]: {run.scenario.summary}", soft_wrap=True, highlight=False)
     keys = declared_keys(type(run.scenario))
     resolved = [
@@ -56,6 +60,9 @@ def print_run(console: Console, run: Run) -> None:
     lengths = f"lengths are taken to be in {NAMES[run.unit]}, from the size of gravity; what follows is in m and N"
     for line in [lengths] * (run.unit != 1.0) + [", ".join(resolved)] * bool(resolved) + read:
         console.print(line, highlight=False, markup=False, soft_wrap=True, style="dim")
+
+
+def _verdict_table(run: Run, summary: Mapping[str, Any]) -> Table:
     table = Table()
     for heading in ("measured in MuJoCo" + (", worst world" if run.worlds > 1 else ""), "value", "limit", ""):
         table.add_column(heading, justify="right" if heading in ("value", "limit") else "left")
@@ -71,20 +78,25 @@ def print_run(console: Console, run: Run) -> None:
             floor, unknown = 1e3 * summary["slip_floor_m"], summary["slip_floor_unknown"]
             told = f"unknown: {unknown}" if unknown else f"{_short(floor)} mm"
             table.add_row("  of which the simulator's own, predicted", told, "", "", style="dim")
-    console.print(table)
+    return table
+
+
+def _print_verdict(console: Console, run: Run, summary: Mapping[str, Any]) -> None:
     failed = run.failed_worlds.size
+    certificate = f"   greatest KKT residual: {summary['residual_max']:.1e}" if run.certified else ""
     console.print(
         f"verdict: [bold]{'[green]pass' if not failed else '[red]fail'}[/][/]"
-        f"   worlds: {run.worlds - failed} of {run.worlds} within limits"
-        f"   greatest KKT residual: {summary['residual_max']:.1e}"
+        f"   worlds: {run.worlds - failed} of {run.worlds} within limits{certificate}"
     )
     if run.worlds > 1:
-        some = ", ".join(str(i) for i in run.failed_worlds[:_FAILED]) + f" and {failed - _FAILED} more" * (
-            failed > _FAILED
-        )
-        console.print(
-            f"the worst world is {run.worst_world}" + f"; those that fail are {some}" * bool(failed), highlight=False
-        )
+        more = f" and {failed - _FAILED} more" * (failed > _FAILED)
+        some = ", ".join(str(i) for i in run.failed_worlds[:_FAILED]) + more
+        line = f"the worst world is {run.worst_world}" + f"; those that fail are {some}" * bool(failed)
+        console.print(line, highlight=False)
+
+
+def _print_times(console: Console, run: Run, summary: Mapping[str, Any]) -> None:
+    """How long the run took, its plans included."""
     console.print(
         f"{summary['sim_s']:g} s simulated in {summary['wall_s']:.2f} s; stating, solving and certifying the problem:"
         f" {summary['solve_us_median']:.1f} us a step (99th percentile {summary['solve_us_p99']:.1f})",
@@ -104,6 +116,10 @@ def print_run(console: Console, run: Run) -> None:
             f" the object is at most {_short(summary['plan_angle_error_max_deg'])} deg off it",
             soft_wrap=True,
         )
+
+
+def _print_notes(console: Console, run: Run, summary: Mapping[str, Any]) -> None:
+    """What a user has to know of: bounds that did not suffice, warnings, reasons, events."""
     if summary["bounded_steps"]:
         told = f"{summary['bounded_steps']} of {run.status.size} steps: the bounds did not allow what was asked for"
         console.print(told, style="yellow", soft_wrap=True)
@@ -115,12 +131,6 @@ def print_run(console: Console, run: Run) -> None:
         console.print(f"world {event.world}, {event.time:.3f} s: {event.what}", style="yellow", soft_wrap=True)
     if len(run.events) > _EVENTS:
         console.print(f"and {len(run.events) - _EVENTS} more events, all in summary.json", style="yellow")
-
-
-def key_help() -> list[tuple[str, list[tuple[str, str]]]]:
-    """The keys of `--set` by what they are keys of, and those of `--limit`, each with what it means and may be."""
-    options = {"--set": Scenario, "--limit": Limits}
-    return [(f"Keys of {option}: {group}", rows) for option, cls in options.items() for group, rows in described(cls)]
 
 
 def _words(read: Mapping[str, Any], between: str = ", ") -> str:
@@ -151,63 +161,6 @@ def _shown(value: Any) -> str:
 
 def _plain(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def print_scenarios(console: Console) -> None:
-    """A line for each scenario."""
-    width = max(len(name) for name in SCENARIOS)
-    for name, case in SCENARIOS.items():
-        console.print(f"{name:{width}}  {case.summary}", highlight=False, soft_wrap=True)
-    own = "an object of your own, by 20 deg: --model FILE.xml --body NAME --contact vertex"
-    console.print(f"{OWN:{width}}  {own}", highlight=False, soft_wrap=True)
-
-
-def print_examples(console: Console, results: list[tuple[list[Digit], Solution]]) -> None:
-    """The worked example: what is printed against what is solved, then how far each method is from it."""
-    for example in EXAMPLES:
-        mine = [(digits, solution) for digits, solution in results if digits[0].example == example.name]
-        console.print(f"[bold]{example.name}[/]: {example.summary}", soft_wrap=True)
-        table = Table()
-        for heading in ("", "expected", "solved", "last digit"):
-            table.add_column(heading, justify="left" if not heading else "right")
-        for digit in mine[0][0]:
-            places = len(digit.expected.partition(".")[2]) + 2
-            word = "same" if digit.rounds else "1 apart" if digit.agrees else "[red]DIFFERS[/]"
-            table.add_row(digit.quantity, digit.expected, f"{digit.value:.{places}f}", word)
-        console.print(table)
-    methods = Table()
-    for heading in ("method", *(f"KKT residual, {example.name}" for example in EXAMPLES), "digits"):
-        methods.add_column(heading, justify="left" if heading == "method" else "right")
-    for name in dict.fromkeys(digits[0].method for digits, _ in results):
-        own = [(digits, solution) for digits, solution in results if digits[0].method == name]
-        cells = [
-            f"{solution.residual:.0e}" + ("" if solution.status == "solved" else f" ({solution.status})")
-            for _, solution in own
-        ]
-        agree = all(digit.agrees for digits, _ in own for digit in digits)
-        methods.add_row(name, *cells, "[green]agree[/]" if agree else "[red]DIFFER[/]")
-    console.print(methods)
-    exact = [digit for digit in results[0][0] if digit.agrees and not digit.rounds]
-    for digit in exact:
-        console.print(
-            f"{digit.quantity}: the notes print {digit.expected}; the optimum is {digit.value:.7f}, one unit of the"
-            " last digit away, which is what their solver's tolerance leaves (docs/errata.md).",
-            soft_wrap=True,
-            highlight=False,
-        )
-
-
-def jsonable(value: Any) -> Any:
-    """`value` with NumPy scalars as numbers and what is not finite as null: JSON has no nan."""
-    if isinstance(value, dict):
-        return {key: jsonable(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [jsonable(item) for item in value]
-    if isinstance(value, np.generic):
-        return jsonable(value.item())
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value
 
 
 def _short(value: float) -> str:
