@@ -139,19 +139,17 @@ def attach(
     if not isinstance(model, mujoco.MjModel):
         raise fail("model", model, "a mujoco.MjModel")
     found = read_body(model, body, support)
-    if not isinstance(contacts, Sequence | np.ndarray) or len(contacts) == 0:
-        raise fail("contacts", contacts, "a list of at least one point")
-    points = [found.point(contact) for contact in contacts]
-    radii = array("radius", np.broadcast_to(radius, len(points)) if np.ndim(radius) == 0 else radius, (len(points),))
-    if found.dim == 2 and len(points) != 1:
-        raise ModelError(f"contacts = {[p.tolist() for p in points]}: must be one point for a planar body")
+    points, radii = _contact_points(found, contacts, radius)
     refuse_off_body(model, found, contacts, radii)
     there = None if any(np.size(contact) == 2 for contact in contacts) else np.array(contacts, dtype=float)
     friction = read_friction(model, found.index, found.support, there) if mu is None else mu
     frame = None if found.dim == 2 else matrix(found.table)
+    stuck = [
+        Contact(at, friction, f_min, frame=frame, radius=float(rho)) for at, rho in zip(points, radii, strict=True)
+    ]
     controller = WrenchController(
         Body(found.mass, found.inertia),
-        [Contact(at, friction, f_min, frame=frame, radius=float(rho)) for at, rho in zip(points, radii, strict=True)],
+        stuck,
         Law.dynamic() if law is None else law,
         found.gravity,
         base=found.table,
@@ -160,3 +158,14 @@ def attach(
         Q_f=Q_f,
     )
     return Attached(model, found, controller)
+
+
+def _contact_points(found: RigidBody, contacts: Sequence[ArrayLike], radius: ArrayLike) -> tuple[list[Array], Array]:
+    """Contacts from the CoM in object axes, and the radius of each."""
+    if not isinstance(contacts, Sequence | np.ndarray) or len(contacts) == 0:
+        raise fail("contacts", contacts, "a list of at least one point")
+    points = [found.point(contact) for contact in contacts]
+    radii = array("radius", np.broadcast_to(radius, len(points)) if np.ndim(radius) == 0 else radius, (len(points),))
+    if found.dim == 2 and len(points) != 1:
+        raise ModelError(f"contacts = {[p.tolist() for p in points]}: must be one point for a planar body")
+    return points, radii

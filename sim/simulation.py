@@ -55,16 +55,16 @@ def simulate(
 
     Args:
         name: of a shipped scenario, or a `Scenario`.
-        worlds: how many; they differ by what is drawn at random from `seed`: their initial angle errors, and the noise
-            of measurements if there is any. World i of one run is world i of any other with the same seed.
+        worlds: how many; they differ by what is drawn from `seed`: their initial angle errors, and noise if there is
+            any. World i of one run is world i of any other with the same seed.
         seed: same seed, same arrays, bit for bit.
         controller: to be tested in place of the scenario's own, which is built from what the scenario believes.
         control: a function of your own that decides on the wrench in place of the controller, see `OwnControl`.
         observe: a function of your own that estimates the states from what is measured, see `stages.Observe`.
         first_world: number of the first world, with which one world of a larger run is run again alone.
         progress: called with (steps done, steps) about a hundred times.
-        open_loop: plan the whole motion once, in steps of the scenario's `plan_step`, and apply those wrenches whatever
-            happens: the run's `plan` is then to be compared with what MuJoCo makes of it.
+        open_loop: plan the whole motion once, in steps of `plan_step`, and apply those wrenches whatever happens; the
+            run's `plan` is then to be compared with what MuJoCo makes of it.
         overrides: keys of the scenario; `world={"mu": 0.2}` or `**{"world.mu": 0.2}` changes the world alone.
 
     Raises:
@@ -103,6 +103,7 @@ class _Begun(NamedTuple):
 
     @property
     def steps(self) -> int:
+        """N."""
         return len(self.time) - 1
 
 

@@ -102,19 +102,22 @@ def stance(
         reason = str(error)
     if one is not None:
         return replace(one, face=_down(body, one))
-    if not reason:
-        met = search(body, contact, None, now, shown, height)
-        some = islice(met, 1) if isinstance(contact, str) else met  # of a given contact all faces
-        first = max(some, key=lambda one: one.range[1], default=None)
-        if told:
-            reason = told
-        elif alternating is not None:
-            reason = not_held(body, contact, alternating, shown)
-        elif first is not None and arc is not None:
-            reason = out_of_range(body, contact, first.held, first.up, first.range[1], arc, shown)
-        else:
-            reason = no_contact(body, contact, shown)
+    if not reason and alternating is not None and not told:
+        reason = not_held(body, contact, alternating, shown)
+    reason = reason or told or _out_of_reach(body, contact, arc, now, shown, height)
     raise ModelError(reason + _way_out(body, contact, arc, now, gripped, misfit, shown))
+
+
+def _out_of_reach(
+    body: Hull, contact: str | ArrayLike, arc: Arc | None, now: Array | None, shown: Shown, height: float
+) -> str:
+    """Why no contact allows the arc: there is none, or it is tilted too far."""
+    met = search(body, contact, None, now, shown, height)
+    some = islice(met, 1) if isinstance(contact, str) else met  # of a given contact all faces
+    first = max(some, key=lambda one: one.range[1], default=None)
+    if first is not None and arc is not None:
+        return out_of_range(body, contact, first.held, first.up, first.range[1], arc, shown)
+    return no_contact(body, contact, shown)
 
 
 def planar_stance(
