@@ -74,6 +74,7 @@ def simulate(
     if not isinstance(name, str | Scenario):
         raise fail("scenario", name, "a name or a Scenario")
     asked = (scenario(name) if isinstance(name, str) else name).change(**overrides)
+    asked.refuse_without_effect(overrides, open_loop)
     for key, value, least in (("worlds", worlds, 1), ("seed", seed, 0), ("first_world", first_world, 0)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
             raise fail(key, value, f"a whole number >= {least}")
