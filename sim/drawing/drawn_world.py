@@ -6,6 +6,7 @@ from functools import cached_property
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.models.support_surfaces import upward
 from pivoting.sim.drawing.shapes import Solid, arcs, body_solids, cone
 from pivoting.sim.pipeline.control import FAILED
 from pivoting.sim.run import Run
@@ -15,6 +16,7 @@ Rows = NDArray[np.intp]
 
 FAR = 1e4  # [m, m/s, rad/s]: a state beyond it has diverged
 UP = np.array([0.0, 0.0, 1.0])
+EYE = {2: (0.0, 2.05, 0.25), 3: (0.95, 1.25, 0.55)}  # from the centre to the right, towards us and up [sides]
 DEPTH = 0.4  # of the drawn block, in sides: the plane knows none
 BOLD, THIN = 0.02, 0.012  # radii of the arrows of the applied wrench, and of the weight and the moment's arc, in sides
 
@@ -106,6 +108,22 @@ class DrawnWorld:
         return -self.away * (self.depth + 0.02 * self.side) * (self.dim == 2)
 
     @property
+    def along_axis(self) -> Array:
+        """(3,) the level unit vector into the picture along the axis that the object turns about, world axes.
+
+        Counter-clockwise turns are then seen as such; `away` of an object that turns about the vertical.
+        """
+        axis, up = self.run.turn[0], upward(self.model)
+        level = up * (axis @ up) - axis
+        size = float(np.linalg.norm(level))
+        return level / size if size > 0.5 else self.away
+
+    def eye(self, into: Array) -> Array:
+        """(3,) from the centre of the picture to where it is seen from, with `into` (3,) into it, world axes [m]."""
+        up = upward(self.model)
+        return self.side * np.array(EYE[self.dim]) @ np.array([np.cross(into, up), -into, up])
+
+    @property
     def weight(self) -> Array:
         """(3,) m g, world axes [N]."""
         return self.run.truth.mass * self.run.truth.gravity
@@ -158,14 +176,20 @@ class DrawnWorld:
         return self.run.wrench_world[self.world, rows, 3:] / self.length * self.scale
 
     def moment_arcs(self, rows: Rows) -> Array:
-        """(R, 28, 3) the applied moment of a planar run as an arc about the CoM, world axes [m].
+        """(R, 28, 3) the applied moment as an arc about the CoM, in space about its own axis, world axes [m].
 
         270 deg stand for what the moments usually stay below, or for a tenth of m g at the corner's lever if more.
         """
-        moment = self.run.wrench[self.world, : self.answers, 2]
+        if self.dim == 2:
+            moment = self.run.wrench[self.world, : self.answers, 2]
+            plane = np.broadcast_to(self.run.table_axes[:, [0, 2]], (len(rows), 3, 2))
+        else:
+            vectors = self.run.wrench_world[self.world, : self.answers, 3:]
+            moment = np.linalg.norm(vectors, axis=1)
+            plane = _planes_across(vectors)[rows]
         full = max(usual(moment), 0.05 * self.side / self.scale * float(np.linalg.norm(self.run.points)))
         sweep = np.deg2rad(np.clip(270.0 * moment[rows] / full, -330.0, 330.0))
-        return arcs(sweep, 0.2 * self.side) @ self.run.table_axes[:, [0, 2]].T
+        return arcs(sweep, 0.2 * self.side) @ np.swapaxes(plane, 1, 2)
 
     def measured(self, rows: Rows) -> Array:
         """(R, K, 3) arrows of the measured contact forces, table axes [m]."""
@@ -192,3 +216,16 @@ def usual(values: Array) -> float:
     """What 95 % of the magnitudes that are finite stay below; 0 if none is."""
     finite = np.abs(values[np.isfinite(values)])
     return float(np.quantile(finite, 0.95)) if finite.size else 0.0
+
+
+def _planes_across(vectors: Array) -> Array:
+    """(N, 3, 2) axes of the plane across each of `vectors` (N, 3), which turns counter-clockwise about it.
+
+    The first is also across that one of the world's axes which none of them comes near.
+    """
+    size = np.linalg.norm(vectors, axis=1, keepdims=True)
+    axis = np.divide(vectors, size, out=np.zeros_like(vectors), where=size > 0.0)
+    first = np.cross(np.eye(3)[np.abs(axis).max(axis=0).argmin()], axis)
+    size = np.linalg.norm(first, axis=1, keepdims=True)
+    first = np.divide(first, size, out=np.zeros_like(first), where=size > 0.0)
+    return np.stack([first, np.cross(axis, first)], axis=2)

@@ -50,13 +50,13 @@ from pivoting.sim.drawing.colours import (
 from pivoting.sim.drawing.drawn_world import BOLD, THIN, UP, Array
 from pivoting.sim.drawing.recorded_world import PLOTS, SCENE, Film, xyzw
 from pivoting.sim.drawing.recording_id import digest
+from pivoting.sim.drawing.whole_file import whole
 from pivoting.sim.judging.measures import predicted_slip
 from pivoting.sim.pipeline.control import BOUNDED, FAILED, INACCURATE
 from pivoting.sim.run import Run
 
 OFF = ("off", "false", "0")  # of RERUN, as rerun reads it
 QUAD = [[0, 1, 2], [0, 2, 3]]  # triangles of four corners
-EYE = {2: (0.0, 2.05, 0.25), 3: (0.95, 1.25, 0.55)}  # from the centre to the right, towards us and up [sides]
 FINE, WIDE = 1.5, 4.0  # line widths: what was measured shows under what was predicted
 CROWDED = 2  # contacts: the legend of more would cover their plots
 LACKING = {  # status of an answer that does not give what is required -> what is said of that
@@ -112,14 +112,12 @@ def record(run: Run, path: str | os.PathLike[str], *, world: int | None = None) 
         raise RecordingOffError(f"RERUN={os.environ['RERUN']} is set in the environment")
     import rerun as rr  # takes a second
 
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
     strict = rr.strict_mode()
     rr.set_strict_mode(True)  # it raises where it would only warn
     try:
-        partial.write_bytes(_encoded(run, int(world), rr))
-        partial.replace(path)
+        with whole(path) as partial:
+            partial.write_bytes(_encoded(run, int(world), rr))
     finally:
-        partial.unlink(missing_ok=True)
         rr.set_strict_mode(strict)
     return path
 
@@ -328,7 +326,6 @@ def _blueprint(film: Film, plots: list[str]) -> Any:
         eyes = rrb.EyeControls3D(position=eye, look_target=centre, eye_up=UP)
         return rrb.Spatial3DView(origin=origin, name=name, eye_controls=eyes, background=DARK, line_grid=False)
 
-    eye = film.centre + film.side * np.array(EYE[film.dim]) @ np.array([np.cross(film.away, UP), -film.away, UP])
     lines = []
     for name in plots:
         title, corner = TITLES[name]
@@ -342,7 +339,7 @@ def _blueprint(film: Film, plots: list[str]) -> Any:
     else:
         second = rrb.Vertical(*lines[6:])
     below = rrb.Horizontal(second, rrb.TextDocumentView(origin="report", name="verdict"), column_shares=[5, 4])
-    scene = view("world", "side view" if film.dim == 2 else "scene", eye, film.centre)
+    scene = view("world", "side view" if film.dim == 2 else "scene", film.centre + film.eye(film.away), film.centre)
     left = rrb.Vertical(scene, below, row_shares=[10, 9])
     speed = min(1.0, 0.25 * float(film.run.time[-1]))  # four seconds to watch, at least
     return rrb.Blueprint(
