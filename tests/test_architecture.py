@@ -59,8 +59,9 @@ def test_everything_public_is_documented(path: Path) -> None:
 def test_what_is_imported_is_declared() -> None:
     """A dependency that happens to be installed is missing on the next machine."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    declared = {line.split(">")[0].split("=")[0].split("<")[0].strip() for line in project["dependencies"]}
-    packages = {"rerun": "rerun-sdk", "mpl_toolkits": "matplotlib"}
+    lines = [*project["dependencies"], *project["optional-dependencies"]["video"]]
+    declared = {line.split(">")[0].split("=")[0].split("<")[0].strip() for line in lines}
+    packages = {"rerun": "rerun-sdk", "mpl_toolkits": "matplotlib", "PIL": "pillow"}
     import sys
 
     for path in FILES:
