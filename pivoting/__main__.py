@@ -97,6 +97,8 @@ def _command(interrupt: _Interrupt) -> Callable[[], int]:
     """The command line; what libraries print on stdout as they are imported goes to stderr."""
     kept = os.dup(1)
     os.dup2(2, 1)
+    graphics = os.environ.get("MUJOCO_GL")
+    os.environ["MUJOCO_GL"] = "disable"  # mujoco's import would fail where there is none; what draws looks for itself
     try:
         before_compiling.append(partial(_watch_compilers, interrupt))
         from pivoting.sim.console.command_line import main as command
@@ -105,6 +107,9 @@ def _command(interrupt: _Interrupt) -> Callable[[], int]:
     finally:
         os.dup2(kept, 1)
         os.close(kept)
+        os.environ.pop("MUJOCO_GL")
+        if graphics is not None:
+            os.environ["MUJOCO_GL"] = graphics
     return command
 
 

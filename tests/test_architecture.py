@@ -63,8 +63,9 @@ def test_everything_public_is_documented(path: Path) -> None:
 def test_what_is_imported_is_declared() -> None:
     """A dependency that happens to be installed is missing on the next machine."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    declared = {line.split(">")[0].split("=")[0].split("<")[0].strip() for line in project["dependencies"]}
-    packages = {"rerun": "rerun-sdk", "mpl_toolkits": "matplotlib", "lazy_loader": "lazy-loader"}
+    lines = [*project["dependencies"], *project["optional-dependencies"]["video"]]
+    declared = {line.split(">")[0].split("=")[0].split("<")[0].strip() for line in lines}
+    packages = {"rerun": "rerun-sdk", "mpl_toolkits": "matplotlib", "PIL": "pillow", "lazy_loader": "lazy-loader"}
     for path in FILES:
         for name in imported(path):
             top = name.split(".")[0]

@@ -74,6 +74,13 @@ def test_while_results_are_written(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_while_frames_are_drawn(tmp_path: Path) -> None:
+    """Neither the file nor what was written of it."""
+    process = started("render", "balance-2d", "--size", "240x240", "--out", str(tmp_path / "a.gif"))
+    interrupted_when(lambda: any(path.suffix == ".part" for path in tmp_path.iterdir()), process)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_results_appear_together(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shipped: Callable[[str], Run]
 ) -> None:

@@ -1,17 +1,15 @@
-"""The command line: `pivoting example | list | contacts | run`. Exit 0: pass, 1: fail, 2: bad usage in one line."""
+"""The command line: `pivoting example | list | contacts | run | render`. Exit 0: pass, 1: fail, 2: one line of why."""
 
 import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 from pivoting import __version__
+from pivoting.sim.console.scenario_options import chosen_scenario, scenario_options
 from pivoting.sim.console.stdout import JsonOutput, console, json_option
-
-if TYPE_CHECKING:
-    from pivoting.sim.scenarios.scenario import Scenario
 
 # What one command alone needs, as rerun and matplotlib, is imported by that.
 
@@ -94,17 +92,8 @@ class _RunCommand(click.Command):
 @click.argument("scenario")
 @click.option("--worlds", type=click.IntRange(min=1), default=1, show_default=True, help="How many worlds.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the initial errors.")
-@click.option(
-    "--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key, or world.KEY for the world alone."
-)
 @click.option("--limit", "limits", multiple=True, metavar="KEY=VALUE", help="Change a limit of the verdict.")
-@click.option("--model", type=click.Path(path_type=Path), help="An MJCF file of your own, for the scenario pivot.")
-@click.option("--body", help="Name of the body in it that is pivoted, or '#1' of one without a name.")
-@click.option(
-    "--contact", help='What it turns about: vertex, edge, lowest, or "x,y,z" or "x,y,z; x,y,z" in its frame, m.'
-)
-@click.option("--support", help="Name (or '#id') of the geom that it stands on; by default what is under it.")
-@click.option("--as-modelled", is_flag=True, help="Keep the file's contact and solver parameters.")
+@scenario_options
 @click.option("--open-loop", is_flag=True, help="Plan the whole motion once and apply that, whatever happens.")
 @click.option("--out", type=click.Path(), help="Folder for SCENARIO.rrd, SCENARIO.summary.json and summary.json.")
 @click.option("--record-world", type=click.IntRange(min=0), help="Which world is recorded; by default the worst.")
@@ -129,19 +118,9 @@ def run(
     weight as it is believed (of a moment at the lever from contact to centre of mass, of a rate per second), 2T twice
     its natural time, sqrt(lever / gravity).
     """
-    from pivoting.sim.scenarios.shipped_scenarios import OWN
-    from pivoting.sim.scenarios.shipped_scenarios import scenario as find
     from pivoting.sim.simulation import simulate
 
-    changes: dict[str, Any] = _pairs("--set", settings)
-    if "limits" in changes:
-        raise click.BadParameter("--set limits: must be --limit KEY=VALUE")
-    changes["limits"] = _pairs("--limit", limits)
-    case = (_own(**own) if scenario == OWN else find(scenario)).change(**changes)
-    case.refuse_without_effect(case.given, open_loop)
-    given = [key for key, value in own.items() if value is not None and value is not False]
-    if given and not case.own:
-        raise click.BadParameter(f"--{given[0].replace('_', '-')}: only the scenario {OWN} takes it, not {scenario!r}")
+    case = chosen_scenario(scenario, settings, limits, open_loop, **own)
     if record_world is not None and (out is None or record_world >= worlds):
         allowed = "given with --out" if out is None else f"less than {worlds}, the number of worlds"
         raise click.BadParameter(f"--record-world {record_world}: must be {allowed}")
@@ -171,6 +150,53 @@ def run(
     for line in () if saved is None else saved.said:
         click.echo(line)  # under --json on stderr, as all else
     return 1 if finished.verdict == "fail" else 0
+
+
+@cli.command()
+@click.argument("scenario", required=False)
+@scenario_options
+@click.option("--world", type=click.IntRange(min=0), default=0, show_default=True, help="Which of many worlds.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the initial errors.")
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="The file, .gif, .mp4 or .png.")
+@click.option("--size", default="640x480", show_default=True, metavar="WxH", help="Width and height in pixels.")
+@click.option("--fps", type=int, help="Frames a second of a moving picture.  [default: 25]")
+@click.option("--speed", type=float, help="Of it: 1 is real time, 0.5 half as fast.  [default: 1]")
+@click.option("--time", type=float, help="Of one picture, a .png file, s.  [default: the middle of the run]")
+def render(
+    scenario: str | None,
+    settings: tuple[str, ...],
+    world: int,
+    seed: int,
+    out: Path,
+    size: str,
+    fps: int | None,
+    speed: float | None,
+    time: float | None,
+    **own: Any,
+) -> int:
+    """Draw a run of SCENARIO, or of an object of your own, as MuJoCo renders it; exit 0 if that is written.
+
+    At the centre of mass the applied force and moment, at each contact the measured force and the friction cone, and
+    the paths of the centre of mass and of a corner. Keys of --set are those of `pivoting run`; no display is needed.
+    """
+    from pivoting.sim.drawing.offscreen import check_graphics
+    from pivoting.sim.drawing.scene_video import Output
+    from pivoting.sim.drawing.scene_video import render as write
+    from pivoting.sim.simulation import simulate
+
+    if scenario is None and own["model"] is None:
+        raise click.UsageError("Missing argument 'SCENARIO', or --model FILE.xml --body NAME.")
+    scenario = scenario or "pivot"
+    case = chosen_scenario(scenario, settings, (), False, **own)
+    output = Output(out, _size(size), fps, speed, time)
+    check_graphics()
+    with _progress(scenario) as report:
+        finished = simulate(case, 1, seed, first_world=world, progress=report)
+    with _progress(str(out)) as report:
+        frames = write(finished, output, progress=report)
+    told = f"{frames} frame{'s' * (frames > 1)} of a run of {finished.time[-1]:g} s, verdict: {finished.verdict}"
+    click.echo(f"wrote {out}: {told}")
+    return 0
 
 
 @cli.command()
@@ -239,36 +265,12 @@ def _refuse(message: str) -> int:
     return 2
 
 
-def _pairs(option: str, pairs: tuple[str, ...]) -> dict[str, str]:
-    out: dict[str, str] = {}
-    for pair in pairs:
-        key, equals, value = pair.partition("=")
-        if not equals or not key or not value:
-            raise click.BadParameter(f"{option} {pair!r}: must be KEY=VALUE")
-        if key in out:
-            raise click.BadParameter(f"{option} {pair!r}: {key} is already given as {out[key]}")
-        out[key] = value
-    return out
-
-
-def _own(
-    model: Path | None, body: str | None, contact: str | None, support: str | None, as_modelled: bool
-) -> "Scenario":
-    """The scenario of an object of one's own."""
-    from pivoting.sim.scenarios.shipped_scenarios import own_object
-
-    for option, value in (("--model", model), ("--body", body)):
-        if value is None:
-            raise click.BadParameter(f"{option} is missing: pivot needs --model FILE.xml --body NAME")
-    assert model is not None
-    assert body is not None
-    where: str | list[list[float]] = "lowest" if contact is None else contact
-    if contact is not None and "," in contact:
-        try:
-            where = [[float(number) for number in point.split(",")] for point in contact.split(";")]
-        except ValueError:
-            raise click.BadParameter(f'--contact {contact!r}: must be "x,y,z" or "x,y,z; x,y,z"') from None
-    return own_object(model, body, where, support=support, chosen=not as_modelled)
+def _size(text: str) -> tuple[int, int]:
+    """Of a picture, as WIDTHxHEIGHT."""
+    width, _, height = text.partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise click.BadParameter(f"--size {text!r}: must be WIDTHxHEIGHT, such as 640x480")
+    return int(width), int(height)
 
 
 def _make_folder(name: str) -> Path:

@@ -1,7 +1,6 @@
 """What a run leaves in a folder: its recording and its summary, named after the scenario, or the object and contact."""
 
 import json
-import os
 import re
 import shlex
 import signal
@@ -14,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pivoting.sim.console.json_values import jsonable
 from pivoting.sim.drawing.rerun_recording import RecordingOffError, record
+from pivoting.sim.drawing.whole_file import part
 from pivoting.sim.run import Run
 from pivoting.sim.scenarios.scenario import Scenario
 
@@ -59,7 +59,7 @@ def save(run: Run, folder: Path, world: int | None = None, *, also: Mapping[str,
     parts: dict[Path, Path] = {}
     try:
         try:
-            parts[recording] = _part(recording)
+            parts[recording] = part(recording)
             record(run, parts[recording], world=chosen)
             which = (
                 f"world {chosen} of {run.worlds}" + (", the worst," if world is None else "")
@@ -78,20 +78,16 @@ def save(run: Run, folder: Path, world: int | None = None, *, also: Mapping[str,
         }
         text = json.dumps(summary, allow_nan=False, indent=1) + "\n"
         for target in (folder / f"{name}.summary.json", folder / LATEST):
-            parts[target] = _part(target)
+            parts[target] = part(target)
             parts[target].write_text(text)
         with _uninterrupted():
-            for target, part in parts.items():
-                part.replace(target)
+            for target, file in parts.items():
+                file.replace(target)
     finally:
-        for part in parts.values():
-            part.unlink(missing_ok=True)
+        for file in parts.values():
+            file.unlink(missing_ok=True)
     wrote = "replaced" if replaced else "wrote"
     return Saved(summary, [f"{wrote} {folder / f'{name}.summary.json'}, also as {LATEST}", told])
-
-
-def _part(target: Path) -> Path:
-    return target.with_name(f".{target.name}.{os.getpid()}.part")
 
 
 @contextmanager

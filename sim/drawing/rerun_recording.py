@@ -26,22 +26,37 @@ import numpy as np
 from pivoting.controller.solution import BOUNDED, FAILED, INACCURATE, STATUS
 from pivoting.controller.solution_space import SolutionSpace
 from pivoting.controller.validate import fail
-from pivoting.sim.drawing.recorded_world import PLOTS, SCENE, UP, Array, Colour, Film, Rows, usual, xyzw
+from pivoting.sim.drawing.colours import (
+    BLOCK,
+    BLUE,
+    DARK,
+    EDGES,
+    GLASS,
+    GREEN,
+    GREY,
+    LIME,
+    MINT,
+    ORANGE,
+    PINK,
+    PURPLE,
+    RED,
+    TABLE,
+    TEAL,
+    VIOLET,
+    WHITE,
+    YELLOW,
+    Colour,
+)
+from pivoting.sim.drawing.drawn_world import BOLD, THIN, UP, Array
+from pivoting.sim.drawing.recorded_world import PLOTS, SCENE, Film, xyzw
 from pivoting.sim.drawing.recording_id import digest
-from pivoting.sim.drawing.shapes import arcs, cone
+from pivoting.sim.drawing.whole_file import whole
 from pivoting.sim.judging.measures import predicted_slip
 from pivoting.sim.run import Run
 
 OFF = ("off", "false", "0")  # of RERUN, as rerun reads it
 QUAD = [[0, 1, 2], [0, 2, 3]]  # triangles of four corners
-EYE = {2: (0.0, 2.05, 0.25), 3: (0.95, 1.25, 0.55)}  # from the centre to the right, towards us and up [sides]
 FINE, WIDE = 1.5, 4.0  # line widths: what was measured shows under what was predicted
-GREEN, LIME, TEAL = (60, 190, 90), (170, 220, 90), (60, 200, 200)  # applied wrench: all or F_u, F_v, M
-MINT, BLUE, VIOLET = (60, 240, 190), (90, 140, 250), (190, 120, 240)  # and of the six in space the others
-ORANGE, YELLOW = (255, 150, 40), (250, 215, 90)  # predicted contact force: all or f_n, f_t
-RED, PINK = (225, 60, 70), (250, 150, 170)  # measured, likewise
-PURPLE, GREY, WHITE = (165, 130, 235), (170, 170, 170), (235, 235, 235)  # planned cone; the world's, weight; the rest
-BLOCK, EDGES, TABLE, DARK = (70, 105, 145), (150, 185, 225), (120, 112, 100), (24, 26, 30)
 CROWDED = 2  # contacts: the legend of more would cover their plots
 LACKING = {  # status of an answer that does not give what is required -> what is said of that
     BOUNDED: "bounded: lacking",
@@ -96,14 +111,12 @@ def record(run: Run, path: str | os.PathLike[str], *, world: int | None = None) 
         raise RecordingOffError(f"RERUN={os.environ['RERUN']} is set in the environment")
     import rerun as rr  # takes a second
 
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
     strict = rr.strict_mode()
     rr.set_strict_mode(True)  # it raises where it would only warn
     try:
-        partial.write_bytes(_encoded(run, int(world), rr))
-        partial.replace(path)
+        with whole(path) as partial:
+            partial.write_bytes(_encoded(run, int(world), rr))
     finally:
-        partial.unlink(missing_ok=True)
         rr.set_strict_mode(strict)
     return path
 
@@ -142,7 +155,7 @@ def _solids(film: Film) -> None:
         film.still("world/block/solid", rr.Boxes3D(half_sizes=[half], colors=[BLOCK], fill_mode="solid"))
         film.still("world/block/edges", rr.Boxes3D(half_sizes=[half], colors=[EDGES], radii=thin))
     else:
-        colour = BLOCK if film.dim == 2 else (*BLOCK, 60)
+        colour = BLOCK if film.dim == 2 else (*BLOCK, GLASS)
         solid = rr.Mesh3D(vertex_positions=vertices, vertex_normals=normals, albedo_factor=colour)
         film.still("world/block/solid", solid)
         film.still("world/block/edges", rr.LineStrips3D(lines, colors=[EDGES], radii=thin))
@@ -157,8 +170,7 @@ def _table(film: Film) -> Any:
     """What the object stands on, in the table's frame: the whole geom, or, as planes have no end, a slab of it."""
     rr, surface, style = film.rr, film.run.truth.surface, {"colors": [TABLE], "fill_mode": "solid"}
     if film.dim == 2 or np.isinf(surface.thick):
-        slab = film.side * np.array([2.0, 0.5, 0.03] if film.dim == 2 else [1.3, 1.1, 0.03])
-        return rr.Boxes3D(centers=[film.start - slab * UP], half_sizes=[slab], **style)
+        return rr.Boxes3D(centers=[film.start - film.slab * UP], half_sizes=[film.slab], **style)
     middle = -0.5 * surface.thick * UP
     if surface.disc:
         return rr.Cylinders3D(centers=[middle], radii=[surface.half[0]], lengths=[surface.thick], **style)
@@ -169,55 +181,40 @@ def _wrench(film: Film) -> None:
     """At the CoM: the weight, and the applied wrench as an arrow and an arc, in space as two arrows."""
     rr, run, side = film.rr, film.run, film.side
     rows = film.rows(film.answers, SCENE)
-    applied, weight = run.wrench_world[film.world, rows, :3] * film.scale, film.weight * film.scale
+    weight = film.weight * film.scale
     right = np.cross(film.away, UP)
     film.send("world/wrench", rows, rr.Transform3D, translation=run.position[film.world, rows] + film.front)
-    arrow = rr.Arrows3D(vectors=[weight], colors=[GREY], radii=[0.012 * side])
+    arrow = rr.Arrows3D(vectors=[weight], colors=[GREY], radii=[THIN * side])
     film.still("world/wrench/weight", arrow, film.label("m g", GREY, 0.5 * weight + 0.1 * side * right))
     if film.dim == 2:
-        arc = rr.LineStrips3D.from_fields(colors=[TEAL], radii=[0.012 * side])
+        arc = rr.LineStrips3D.from_fields(colors=[TEAL], radii=[THIN * side])
         film.still("world/wrench/moment", arc, film.label("w: moment", TEAL, -0.42 * side * right))
-        film.send("world/wrench/moment", rows, rr.LineStrips3D, strips=_arcs(film, rows))
+        film.send("world/wrench/moment", rows, rr.LineStrips3D, strips=film.moment_arcs(rows))
     else:
-        moment = run.wrench_world[film.world, rows, 3:] / film.length * film.scale
-        film.arrows("world/wrench/moment", rows, moment, TEAL, 0.02 * side, "w: moment")
-    film.arrows("world/wrench/force", rows, applied, GREEN, 0.02 * side, "w: force")
-
-
-def _arcs(film: Film, rows: Rows) -> Array:
-    """(R, 28, 3) the applied moment as an arc about the CoM, world axes [m].
-
-    270 deg stand for what the run's moments usually stay below, or for a tenth of m g at the corner's lever if more.
-    """
-    moment = film.run.wrench[film.world, : film.answers, 2]
-    full = max(usual(moment), 0.05 * film.side / film.scale * float(np.linalg.norm(film.run.points)))
-    sweep = np.deg2rad(np.clip(270.0 * moment[rows] / full, -330.0, 330.0))
-    return arcs(sweep, 0.2 * film.side) @ film.run.table_axes[:, [0, 2]].T
+        film.arrows("world/wrench/moment", rows, film.moment(rows), TEAL, BOLD * side, "w: moment")
+    film.arrows("world/wrench/force", rows, film.applied(rows), GREEN, BOLD * side, "w: force")
 
 
 def _contacts(film: Film) -> None:
     """At each contact point, in the table's frame: its forces, and the friction cones that they have to be in."""
     rr, run, side, plane = film.rr, film.run, film.side, film.dim == 2
-    thin, thick, tall = rr.Radius.ui_points(1.0), (0.015 if plane else 0.012) * side, 0.8 if plane else 0.45
+    thin, thick = rr.Radius.ui_points(1.0), film.thick
     rows = film.rows(film.answers, SCENE)
     pose = np.tile(xyzw(run.truth.table), (rows.size, 1))
-    lift = run.attached.controller.space.lift
+    measured, predicted = film.measured(rows), film.predicted(rows)
     nearest = np.argmin(run.corner[film.world, 0, :, 1])
-    for i, (tag, contact) in enumerate(zip(film.tags, run.attached.controller.contacts, strict=True)):
-        entity = f"world/contact/{tag}".rstrip("/")
+    for i, tag in enumerate(film.tags):
+        entity, name = f"world/contact/{tag}".rstrip("/"), f"f {tag}".strip()
         film.send(entity, rows, rr.Transform3D, translation=film.corner[rows, i] + film.front, quaternion=pose)
-        measured, predicted = (film.scale * lift(f[rows, i]) for f in (run.force_measured[film.world], film.force))
-        film.arrows(f"{entity}/measured", rows, measured, RED, 2.0 * thick, "")
-        film.arrows(f"{entity}/predicted", rows, predicted, ORANGE, thick, f"f {tag}".strip(), at=1.0 if plane else 1.2)
+        film.arrows(f"{entity}/measured", rows, measured[:, i], RED, 2.0 * thick, "")
+        film.arrows(f"{entity}/predicted", rows, predicted[:, i], ORANGE, thick, name, at=1.0 if plane else 1.2)
         film.still(f"{entity}/predicted", rr.Arrows3D.from_fields(origins=[[0.0, -8.0 / 3.0 * thick, 0.0]]))
-        floor, mu_planned = film.scale * contact.f_min, float(film.planned_mu[i])
         aside = 0.35 if plane else 0.2
-        for name, mu, colour, at in (("world", run.world.mu, GREY, -aside), ("planned", mu_planned, PURPLE, aside)):
-            low, high = floor * (name == "planned"), max(tall * side / np.hypot(mu, 1.0), 1.3 * floor)
-            vertices, triangles, lines = cone(mu, low, high, film.dim)
+        for name, colour, at in (("world", GREY, -aside), ("planned", PURPLE, aside)):
+            vertices, triangles, lines = film.cone(i, planned=name == "planned")
             film.still(f"{entity}/cone/{name}", rr.LineStrips3D(lines, colors=[colour], radii=thin))
             if name == "planned":
-                fill = rr.Mesh3D(vertex_positions=vertices, triangle_indices=triangles, albedo_factor=(*colour, 60))
+                fill = rr.Mesh3D(vertex_positions=vertices, triangle_indices=triangles, albedo_factor=(*colour, GLASS))
                 film.still(f"{entity}/cone/{name}", fill)
             if i == nearest:
                 label = film.label(f"cone, {name}", colour, side * np.array([at, 0.0, -0.05]))
@@ -328,7 +325,6 @@ def _blueprint(film: Film, plots: list[str]) -> Any:
         eyes = rrb.EyeControls3D(position=eye, look_target=centre, eye_up=UP)
         return rrb.Spatial3DView(origin=origin, name=name, eye_controls=eyes, background=DARK, line_grid=False)
 
-    eye = film.centre + film.side * np.array(EYE[film.dim]) @ np.array([np.cross(film.away, UP), -film.away, UP])
     lines = []
     for name in plots:
         title, corner = TITLES[name]
@@ -342,7 +338,7 @@ def _blueprint(film: Film, plots: list[str]) -> Any:
     else:
         second = rrb.Vertical(*lines[6:])
     below = rrb.Horizontal(second, rrb.TextDocumentView(origin="report", name="verdict"), column_shares=[5, 4])
-    scene = view("world", "side view" if film.dim == 2 else "scene", eye, film.centre)
+    scene = view("world", "side view" if film.dim == 2 else "scene", film.centre + film.eye(film.away), film.centre)
     left = rrb.Vertical(scene, below, row_shares=[10, 9])
     speed = min(1.0, 0.25 * float(film.run.time[-1]))  # four seconds to watch, at least
     return rrb.Blueprint(

@@ -1,4 +1,4 @@
-"""Shapes as triangles and lines, to be drawn: a body's geoms, a friction cone, an arc with a head."""
+"""Shapes as triangles and lines, to be drawn: a body's geoms, a friction cone, an arc with a head, a shadow."""
 
 from typing import NamedTuple
 
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pivoting.models.frames import matrix
 from pivoting.models.placement.convex_hull import circle, colliding, ellipsoids, sampled, samples
 from pivoting.models.rigid_body import RigidBody
+from pivoting.models.support_surfaces import Surface
 from scipy.spatial import ConvexHull
 
 Array = NDArray[np.float64]
@@ -82,3 +83,32 @@ def arcs(sweep: Array, radius: float) -> Array:
     barb = tip - np.sign(turn) * np.minimum(0.35, np.abs(turn))
     angle, away = np.hstack([shaft, barb, tip, barb]), radius * np.array([1.0] * 25 + [1.25, 1.0, 0.75])
     return np.stack([away * np.cos(angle), away * np.sin(angle)], axis=-1)
+
+
+def shadow(points: Array, surface: Surface) -> Array:
+    """(P, 2) the outline of what points (N, 3) cover of a face that they are over, counter-clockwise; it may be empty.
+
+    All of it along the face (t, o), from its middle [m].
+    """
+    flat = (points - surface.origin) @ surface.axes[:, :2]
+    outline = flat[ConvexHull(flat).vertices]
+    if surface.disc:
+        edges = [(normal, surface.half[0]) for normal in circle(SIDES)[:, :2]]
+    else:
+        edges = list(zip(np.vstack([np.eye(2), -np.eye(2)]), np.tile(surface.half, 2), strict=True))
+    for normal, limit in edges:
+        if len(outline):
+            outline = _cut(outline, outline @ normal - limit)
+    return outline
+
+
+def _cut(outline: Array, beyond: Array) -> Array:
+    """A convex outline (P, 2) without what is beyond a line, by (P,)."""
+    kept = []
+    for k, (point, over) in enumerate(zip(outline, beyond, strict=True)):
+        before = beyond[k - 1]
+        if (over <= 0.0) != (before <= 0.0):
+            kept.append(point + over / (over - before) * (outline[k - 1] - point))
+        if over <= 0.0:
+            kept.append(point)
+    return np.array(kept).reshape(-1, 2)

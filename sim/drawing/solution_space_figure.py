@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from pivoting.controller.solution import Solution
 from pivoting.controller.solution_space import solution_space
+from pivoting.sim.drawing.whole_file import whole
 
 ORANGE, BLUE, BLACK, RED, GREEN = "#e08a1e", "#2f6db3", "#222222", "#c0392b", "#2e8b57"
 
@@ -27,12 +28,8 @@ def draw_solution_space(solution: Solution, path: str | os.PathLike[str], title:
     _draw_forces(figure.add_subplot(1, 2, 2), solution)
     if title:
         figure.suptitle(title)
-    partial = path.with_name(f".{path.name}.part")
-    try:
+    with whole(path) as partial:
         figure.savefig(partial, dpi=110, format=path.suffix[1:] or "png")
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
     return path
 
 
