@@ -4,14 +4,11 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 from pivoting import __version__
 from pivoting.sim.console.stdout import JsonOutput, console, json_option
-
-if TYPE_CHECKING:
-    from pivoting.sim.scenarios.scenario import Scenario
 
 # What one command alone needs, as rerun and matplotlib, is imported by that.
 
@@ -90,9 +87,12 @@ class _RunCommand(click.Command):
 
 
 @cli.command(cls=_RunCommand)
-@click.argument("scenario")
-@click.option("--worlds", type=click.IntRange(min=1), default=1, show_default=True, help="How many worlds.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the initial errors.")
+@click.argument("name", metavar="[SCENARIO]", required=False)
+@click.option(
+    "--scenario", "file", type=click.Path(path_type=Path), help="Run what this file describes, in place of SCENARIO."
+)
+@click.option("--worlds", type=click.IntRange(min=1), help="How many worlds; by default 1, or as the file has it.")
+@click.option("--seed", type=click.IntRange(min=0), help="Of the initial errors; by default 0, or as the file has it.")
 @click.option(
     "--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key, or world.KEY for the world alone."
 )
@@ -105,21 +105,10 @@ class _RunCommand(click.Command):
 @click.option("--support", help="Name (or '#id') of the geom that it stands on; by default what is under it.")
 @click.option("--as-modelled", is_flag=True, help="Keep the file's contact and solver parameters.")
 @click.option("--open-loop", is_flag=True, help="Plan the whole motion once and apply that, whatever happens.")
-@click.option("--out", type=click.Path(), help="Folder for SCENARIO.rrd, SCENARIO.summary.json and summary.json.")
+@click.option("--out", type=click.Path(), help="Folder for what is kept: recording, arrays, scenario and summary.")
 @click.option("--record-world", type=click.IntRange(min=0), help="Which world is recorded; by default the worst.")
 @json_option("Print the summary as one JSON object and nothing else.")
-def run(
-    scenario: str,
-    worlds: int,
-    seed: int,
-    settings: tuple[str, ...],
-    limits: tuple[str, ...],
-    open_loop: bool,
-    out: str | None,
-    record_world: int | None,
-    as_json: JsonOutput | None,
-    **own: Any,
-) -> int:
+def run(out: str | None, record_world: int | None, as_json: JsonOutput | None, **options: Any) -> int:
     """Run SCENARIO in closed loop in MuJoCo; exit 0 if the verdict passes, 1 if it fails.
 
     The scenario pivot takes an object of your own: --model FILE.xml --body NAME --contact vertex.
@@ -128,28 +117,31 @@ def run(
     weight as it is believed (of a moment at the lever from contact to centre of mass, of a rate per second), 2T twice
     its natural time, sqrt(lever / gravity).
     """
-    from pivoting.sim.scenarios.shipped_scenarios import scenario as find
+    from pivoting.sim.console.asked_run import ask, changed_since
     from pivoting.sim.simulation import simulate
 
-    changes: dict[str, Any] = _pairs("--set", settings)
-    if "limits" in changes:
-        raise click.BadParameter("--set limits: must be --limit KEY=VALUE")
-    changes["limits"] = _pairs("--limit", limits)
-    case = (_own(**own) if scenario == "pivot" else find(scenario)).change(**changes)
-    given = [key for key, value in own.items() if value is not None and value is not False]
-    if scenario != "pivot" and given:
-        raise click.BadParameter(f"--{given[0].replace('_', '-')}: only the scenario pivot takes it, not {scenario!r}")
-    if record_world is not None and (out is None or record_world >= worlds):
-        allowed = "given with --out" if out is None else f"less than {worlds}, the number of worlds"
+    asked = ask(**options)
+    if record_world is not None and (out is None or record_world >= asked.worlds):
+        allowed = "given with --out" if out is None else f"less than {asked.worlds}, the number of worlds"
         raise click.BadParameter(f"--record-world {record_world}: must be {allowed}")
     folder = None if out is None else _make_folder(out)
-    with _progress(f"{scenario}, {worlds} world{'s' * (worlds > 1)}") as report:
-        finished = simulate(case, worlds, seed, progress=report, open_loop=open_loop)
+    case = asked.scenario
+    with _progress(f"{case.name}, {asked.worlds} world{'s' * (asked.worlds > 1)}") as report:
+        finished = simulate(
+            case,
+            asked.worlds,
+            asked.seed,
+            first_world=asked.first_world,
+            open_loop=asked.open_loop,
+            progress=report,
+        )
+    if told := changed_since(asked, finished):
+        click.echo(f"pivoting: {options['file']}: {told}", err=True)
 
     from pivoting.sim.console.tables import jsonable, print_run
 
     also: dict[str, Any] = {}
-    if finished.verdict == "fail" and not open_loop:
+    if finished.verdict == "fail" and not asked.open_loop:
         from pivoting.sim.judging.advice import tried
 
         also["advice"] = tried(finished, simulate)
@@ -233,38 +225,6 @@ def _wrong_uses() -> tuple[type[Exception], ...]:
 def _refuse(message: str) -> int:
     click.echo("pivoting: " + " ".join(message.split()), err=True)
     return 2
-
-
-def _pairs(option: str, pairs: tuple[str, ...]) -> dict[str, str]:
-    out: dict[str, str] = {}
-    for pair in pairs:
-        key, equals, value = pair.partition("=")
-        if not equals or not key or not value:
-            raise click.BadParameter(f"{option} {pair!r}: must be KEY=VALUE")
-        if key in out:
-            raise click.BadParameter(f"{option} {pair!r}: {key} is already given as {out[key]}")
-        out[key] = value
-    return out
-
-
-def _own(
-    model: Path | None, body: str | None, contact: str | None, support: str | None, as_modelled: bool
-) -> "Scenario":
-    """The scenario of an object of one's own."""
-    from pivoting.sim.scenarios.shipped_scenarios import own_object
-
-    for option, value in (("--model", model), ("--body", body)):
-        if value is None:
-            raise click.BadParameter(f"{option} is missing: pivot needs --model FILE.xml --body NAME")
-    assert model is not None
-    assert body is not None
-    where: str | list[list[float]] = "lowest" if contact is None else contact
-    if contact is not None and "," in contact:
-        try:
-            where = [[float(number) for number in point.split(",")] for point in contact.split(";")]
-        except ValueError:
-            raise click.BadParameter(f'--contact {contact!r}: must be "x,y,z" or "x,y,z; x,y,z"') from None
-    return own_object(model, body, where, support=support, chosen=not as_modelled)
 
 
 def _make_folder(name: str) -> Path:

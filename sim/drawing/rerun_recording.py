@@ -69,6 +69,12 @@ class RecordingOffError(RuntimeError):
     """The environment says that nothing is to be recorded."""
 
 
+def refuse_if_off() -> None:
+    """Raise RecordingOffError if nothing is to be recorded."""
+    if os.environ.get("RERUN", "").lower() in OFF:
+        raise RecordingOffError(f"RERUN={os.environ['RERUN']} is set in the environment")
+
+
 def record(run: Run, path: str | os.PathLike[str], *, world: int | None = None) -> Path:
     """Write one world of a finished run to `path` (.rrd) and return it; `rerun PATH` shows it.
 
@@ -92,8 +98,7 @@ def record(run: Run, path: str | os.PathLike[str], *, world: int | None = None) 
     world = run.worst_world if world is None else world
     if isinstance(world, bool) or not isinstance(world, int | np.integer) or not 0 <= world < run.worlds:
         raise fail("world", world, f"a whole number in [0, {run.worlds})")
-    if os.environ.get("RERUN", "").lower() in OFF:
-        raise RecordingOffError(f"RERUN={os.environ['RERUN']} is set in the environment")
+    refuse_if_off()
     import rerun as rr  # takes a second
 
     partial = path.with_name(f".{path.name}.{os.getpid()}.part")
