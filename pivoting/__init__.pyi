@@ -7,6 +7,7 @@ from .controller.wrench_problem import WrenchProblem as WrenchProblem
 from .sim.attachment import attach as attach
 from .sim.judging.assertions import assert_sticking as assert_sticking, assert_tracking as assert_tracking
 from .sim.run import Run as Run
+from .sim.saved_run import load as load
 from .sim.scenarios.scenario import Scenario as Scenario
 from .sim.scenarios.shipped_scenarios import own_object as own_object, scenario as scenario
 from .sim.simulation import simulate as simulate

@@ -2,6 +2,7 @@ from .attachment import Attached as Attached, ControlError as ControlError, atta
 from .judging.assertions import assert_sticking as assert_sticking, assert_tracking as assert_tracking
 from .judging.verdict import Check as Check, Limits as Limits
 from .run import Run as Run
+from .saved_run import load as load
 from .scenarios.scenario import Scenario as Scenario
 from .scenarios.shipped_scenarios import SCENARIOS as SCENARIOS, own_object as own_object, scenario as scenario
 from .simulation import simulate as simulate

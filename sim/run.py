@@ -1,7 +1,9 @@
 """A finished run: its arrays, what is measured of them, and the verdict."""
 
+import os
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,9 @@ from pivoting.sim.judging.undeclared_contacts import stray_words
 from pivoting.sim.judging.verdict import Check, Limits, judge, worst_world
 from pivoting.sim.slip import ContactMotion
 from pivoting.sim.trajectory import frozen
+
+if TYPE_CHECKING:
+    import pandas
 
 Array = NDArray[np.float64]
 
@@ -69,6 +74,30 @@ class Run(ContactMotion):
     def summary(self) -> dict[str, Any]:
         """The run in numbers, of the worst world, SI units in the keys; what `--json` prints."""
         return summary(self)
+
+    def save(self, folder: str | os.PathLike[str]) -> Path:
+        """Keep the run in a folder, from which `pivoting.load` gets it back, and return that.
+
+        It is made if need be, and gets two files, both of them whole or neither: run.nc, all arrays, which
+        `xarray.open_dataset(..., engine="scipy")` opens, and scenario.json, which `pivoting run --scenario` runs again,
+        if nothing that the run was made with is a Python object. A run that was kept there before is replaced.
+
+        Raises:
+            OSError: a file cannot be written.
+        """
+        from pivoting.sim.saved_run import save  # which makes runs
+
+        return save(self, folder)
+
+    def to_dataframe(self) -> "pandas.DataFrame":
+        """What people plot of it, as a table; see `data_frame`.
+
+        Raises:
+            ModuleNotFoundError: pandas, of the extra [data], is not installed.
+        """
+        from pivoting.sim.data_frame import data_frame
+
+        return data_frame(self)
 
     @cached_property
     def plan_error(self) -> Array:

@@ -75,19 +75,17 @@ def simulate(
         raise fail("scenario", name, "a name or a Scenario")
     asked = (scenario(name) if isinstance(name, str) else name).change(**overrides)
     asked.refuse_without_effect(overrides, open_loop)
-    for key, value, least in (("worlds", worlds, 1), ("seed", seed, 0), ("first_world", first_world, 0)):
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-            raise fail(key, value, f"a whole number >= {least}")
-    begun = _set_up(asked, controller, (int(seed), int(worlds), int(first_world)))
+    begun = set_up(asked, controller, worlds=worlds, seed=seed, first_world=first_world)
     decided = _control(begun, control, observe, open_loop)
     return _run(begun, decided, progress)
 
 
-class _Begun(NamedTuple):
+class Begun(NamedTuple):
     """A run that is about to begin: the scenario as it was asked for and `absolute`, and all that follows from it.
 
     reference: angles, rates, accelerations (N+1,).  desired, told: orientations and their rates, as the world has the
     table and as the controller knows it.  follow: the latter at any time.  setting: of the stages.
+    given: whether the controller was handed in.
     """
 
     asked: Scenario
@@ -109,33 +107,37 @@ class _Begun(NamedTuple):
 
 
 class _Decided(NamedTuple):
-    """What decides: the control, with the law that it ends in, the stages around it, and whose it is."""
+    """What decides: the control, with the law that it ends in, and the stages around it; what of it was handed in."""
 
     control: Control
     per_step: LawControl
     stages: Stages
-    whose: str
+    python_objects: tuple[str, ...]
 
 
-def _set_up(asked: Scenario, controller: WrenchController | None, counts: tuple[int, int, int]) -> _Begun:
-    """The world and the belief of a scenario; `counts`: seed, worlds, first world."""
+def set_up(asked: Scenario, controller: WrenchController | None, *, worlds: int, seed: int, first_world: int) -> Begun:
+    """The world and the belief of a scenario; arguments and errors as of `simulate`."""
+    for key, value, least in (("worlds", worlds, 1), ("seed", seed, 0), ("first_world", first_world, 0)):
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+            raise fail(key, value, f"a whole number >= {least}")
     scene = load(asked.path, body=asked.body, support=asked.support, chosen=asked.chosen)
     belief = believe(asked, scene, controller)
     case = asked.absolute(belief.placement.load)
     world = build_world(case, belief.scene, scene, belief.placement)
-    time = _times(case, world.dt, counts[1])
+    time = _times(case, world.dt, int(worlds))
     reference, desired, _ = _desired(case, world.placement, time)
     told, follow = _desired(case, belief.placement, time)[1:]  # the controller knows only the table that it believes in
     for values in (time, *reference, *desired):
         values.flags.writeable = False
     turning = -matrix(belief.placement.body.table)[:, 1:2].T if belief.placement.body.dim == 2 else np.eye(3)
+    counts = int(seed), int(worlds), int(first_world)
     setting = Setting(*counts, world.dt, turning, belief.attached.controller.law)
-    return _Begun(
+    return Begun(
         asked, case, belief, world, time, reference, desired, told, follow, setting, given=controller is not None
     )
 
 
-def _control(begun: _Begun, own: OwnControlFunction | None, observe: Observe | None, open_loop: bool) -> _Decided:
+def _control(begun: Begun, own: OwnControlFunction | None, observe: Observe | None, open_loop: bool) -> _Decided:
     """The scenario's control, or the user's own, and the stages around it."""
     case, (_, attached, there) = begun.case, begun.belief
     stages = build_stages(case.stages, begun.setting)
@@ -144,8 +146,10 @@ def _control(begun: _Begun, own: OwnControlFunction | None, observe: Observe | N
     bounds, dt = case.bounds(there.unit), begun.world.dt
     law = LawSolver(attached.controller, bounds, stages.correct)
     per_step = LawControl(law, begun.told, drag_wrench(attached.body, attached.controller, *begun.told))
+    handed = {"controller": begun.given, "control": own is not None, "observe": observe is not None}
+    objects = tuple(name for name, there_is in handed.items() if there_is)
     if own is not None:
-        return _Decided(OwnControl(own, begun.told, dt), per_step, stages, "own control")
+        return _Decided(OwnControl(own, begun.told, dt), per_step, stages, objects)
     if attached.body.drag is not None and (open_loop or case.plan_hz is not None):
         raise ModelError(f"body = {attached.body.name!r}: a plan knows no joint damping or friction; must have none")
     control: Control = per_step
@@ -156,10 +160,10 @@ def _control(begun: _Begun, own: OwnControlFunction | None, observe: Observe | N
         control = receding_horizon_control(case, begun.belief, law, begun.follow, worlds, dt, begun.steps)
     if bounds.any and not open_loop:  # a plan is within them
         control = BoundedControl(control, attached.controller, bounds, dt)
-    return _Decided(control, per_step, stages, "given" if begun.given else "scenario")
+    return _Decided(control, per_step, stages, objects)
 
 
-def _run(begun: _Begun, decided: _Decided, progress: Callable[[int, int], None] | None) -> Run:
+def _run(begun: Begun, decided: _Decided, progress: Callable[[int, int], None] | None) -> Run:
     """Start the worlds, make the steps, and keep what came of them."""
     world, attached = begun.world, begun.belief.attached
     seed, worlds, first = begun.setting[:3]
@@ -181,7 +185,7 @@ def _run(begun: _Begun, decided: _Decided, progress: Callable[[int, int], None] 
 
 
 def _kept(
-    begun: _Begun,
+    begun: Begun,
     decided: _Decided,
     start: tuple[Array, Array],
     log: Log,
@@ -208,7 +212,7 @@ def _kept(
         plans=None if horizons is None else horizons.log,
         events=() if horizons is None else tuple(horizons.events),
         engine_warnings=warnings,
-        controller=decided.whose,
+        python_objects=decided.python_objects,
     )
 
 

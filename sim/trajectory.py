@@ -21,7 +21,6 @@ from pivoting.sim.scenarios.scenario import Scenario
 from pivoting.sim.world import World
 
 Array = NDArray[np.float64]
-OWN_CONTROL = "own control"
 
 
 def frozen(values: Array) -> Array:
@@ -57,8 +56,7 @@ class Trajectory:
         plan: that was played in open loop, else None.
         plans: of a receding horizon, what came of each; else None.  events: what a user has to know of.
         engine_warnings: what MuJoCo warned of, as of a world that diverges: each once, with its first time.
-        controller: "scenario" for the scenario's own, "given" for another that was handed to `simulate`, "own control"
-            for a function of the user's own.
+        python_objects: which of controller, control and observe were handed to `simulate`.
     """
 
     scenario: Scenario
@@ -77,7 +75,7 @@ class Trajectory:
     plans: PlanLog | None
     events: tuple[Event, ...]
     engine_warnings: tuple[str, ...]
-    controller: str
+    python_objects: tuple[str, ...]
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """From pickle, which forgets that arrays are read-only."""
@@ -85,9 +83,17 @@ class Trajectory:
         _freeze(tuple(state.values()))
 
     @property
+    def controller(self) -> str:
+        """ "scenario" for the scenario's own, "given" for another that was handed to `simulate`, "own control" for a
+        function of the user's own."""
+        if "control" in self.python_objects:
+            return "own control"
+        return "given" if "controller" in self.python_objects else "scenario"
+
+    @property
     def certified(self) -> bool:
         """Whether every answer carries a certificate and a prediction of the contact forces."""
-        return self.controller != OWN_CONTROL
+        return "control" not in self.python_objects
 
     @property
     def model(self) -> mujoco.MjModel:

@@ -11,6 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 ROOMS = {"controller": {"controller"}, "models": {"models"}, "sim": {"controller", "models", "sim"}}
+OPTIONAL, EXTRAS = "optional-dependencies", ("data", "video")  # which users install who need what they are for
 FILES = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 FILES += sorted((ROOT / "pivoting").glob("*.py"))  # the front of all rooms
 SHARED = {"compile_hooks", "errors"}  # of the front, for every room: they import nothing
@@ -61,15 +62,18 @@ def test_everything_public_is_documented(path: Path) -> None:
 
 
 def test_what_is_imported_is_declared() -> None:
-    """A dependency that happens to be installed is missing on the next machine."""
+    """A dependency that happens to be installed is missing on the next machine; that of an extra is imported late."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    lines = [*project["dependencies"], *project["optional-dependencies"]["video"]]
-    declared = {line.split(">")[0].split("=")[0].split("<")[0].strip() for line in lines}
+    needed, optional = project["dependencies"], [line for lines in EXTRAS for line in project[OPTIONAL][lines]]
+    declared, extra = ({line.split(">")[0].split("<")[0].strip() for line in lines} for lines in (needed, optional))
     packages = {"rerun": "rerun-sdk", "mpl_toolkits": "matplotlib", "PIL": "pillow", "lazy_loader": "lazy-loader"}
     for path in FILES:
         for name in imported(path):
             top = name.split(".")[0]
-            if top not in sys.stdlib_module_names and top != "pivoting":
+            if top in extra:
+                early = [node for node in ast.parse(path.read_text()).body if isinstance(node, ast.Import)]
+                assert top not in {alias.name for node in early for alias in node.names}, f"{path}: {top}"
+            elif top not in sys.stdlib_module_names and top != "pivoting":
                 assert packages.get(top, top) in declared, f"{path}: {top}"
 
 

@@ -75,7 +75,9 @@ def test_run_writes_recording_and_summary(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "pass" in done.stdout
     out = tmp_path / "new" / "folder"
-    assert sorted(path.name for path in out.iterdir()) == ["snap-2d.rrd", "snap-2d.summary.json", "summary.json"]
+    assert sorted(path.name for path in out.iterdir()) == [
+        "snap-2d.nc", "snap-2d.rrd", "snap-2d.scenario.json", "snap-2d.summary.json", "summary.json",
+    ]  # fmt: skip
     assert json.loads((out / "summary.json").read_text())["verdict"] == "pass"
 
 
@@ -187,17 +189,19 @@ def test_limits_and_worlds_of_a_run(tmp_path: Path) -> None:
     errors = json.loads((tmp_path / "summary.json").read_text())
     assert errors["failed_worlds"] == []
     limit = errors["slip_max_m"] * 0.999999
-    held = pivoting(*words, "--limit", f"slip_m={limit!r}", "--record-world", "3", cwd=tmp_path)
+    words += ["--limit", f"slip_m={limit!r}", "--record-world"]
+    assert pivoting(*words, "2", cwd=tmp_path).returncode == 1
+    held = pivoting(*words, "3", cwd=tmp_path)
     assert held.returncode == 1
-    told = json.loads((tmp_path / "snap-2d.summary.json").read_text())
+    told = json.loads((tmp_path / "snap-2d-2.summary.json").read_text())
     assert told["limits"]["slip_m"] == limit
     assert told["changes"]["limit.slip_m"] == limit
     assert len(told["failed_worlds"]) == 1
     assert told["recorded_world"] == 3
     said = " ".join(held.stdout.split())
     assert f"the worst world is {told['worst_world']}; those that fail are {told['failed_worlds'][0]} " in said
-    assert "replaced snap-2d.summary.json" in said
-    assert "world 3 of 12 is in snap-2d.rrd" in said
+    assert "replaced snap-2d-2.summary.json" in said
+    assert "world 3 of 12 is in snap-2d-2.rrd" in said
     assert "world 3 of 12 is" not in free.stdout
 
 
@@ -209,7 +213,9 @@ def test_no_recording_where_rerun_is_off(tmp_path: Path) -> None:
     lines = done.stderr.strip().splitlines()
     assert lines[-1] == "nothing is recorded: RERUN=off is set in the environment"
     assert len(lines) == 2
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["snap-2d.summary.json", "summary.json"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "snap-2d.nc", "snap-2d.scenario.json", "snap-2d.summary.json", "summary.json",
+    ]  # fmt: skip
 
 
 OWN = """<mujoco><worldbody><geom type="plane" size="1 1 1"/><body name="can" pos="0 0 .2"><freejoint/>
@@ -228,7 +234,8 @@ def test_an_object_of_ones_own(tmp_path: Path) -> None:
     assert summary["body"] == "can"
     assert len(summary["contacts"]) == 1
     assert sorted(path.name for path in out.iterdir()) == [
-        "pivot-can-vertex.rrd", "pivot-can-vertex.summary.json", "summary.json",
+        "pivot-can-vertex.nc", "pivot-can-vertex.rrd", "pivot-can-vertex.scenario.json",
+        "pivot-can-vertex.summary.json", "summary.json",
     ]  # fmt: skip
     for arguments, message in (
         ([*own[:4]], "--body is missing"),

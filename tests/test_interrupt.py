@@ -97,7 +97,9 @@ def test_results_appear_together(
     with pytest.raises(KeyboardInterrupt):
         save(shipped("snap-2d"), tmp_path)
     assert signal.getsignal(signal.SIGINT) is before
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["snap-2d.rrd", "snap-2d.summary.json", "summary.json"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "snap-2d.nc", "snap-2d.rrd", "snap-2d.scenario.json", "snap-2d.summary.json", "summary.json",
+    ]  # fmt: skip
 
 
 LIBRARY = """

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pivoting.sim import SCENARIOS, Run, own_object, simulate
+from pivoting.sim import SCENARIOS, Run, load, own_object, simulate
 from pivoting.sim.console.json_values import jsonable
 from pivoting.sim.console.output_files import save, stem
 from pivoting.sim.drawing.rerun_recording import RecordingOffError, record
@@ -42,11 +42,15 @@ def test_names_tell_runs_apart(tmp_path: Path) -> None:
     assert stem(own_object("a/mug.xml", "mug", "vertex")) == "pivot-mug-vertex"
 
 
+def files(*names: str, recorded: bool = True) -> list[str]:
+    """Those of runs of these names in a folder."""
+    endings = ["nc", "scenario.json", "summary.json"] + ["rrd"] * recorded
+    return sorted(["summary.json", *(f"{name}.{ending}" for name in names for ending in endings)])
+
+
 def test_one_summary_each_and_the_latest(worlds: Run, shipped: Callable[[str], Run], tmp_path: Path) -> None:
     first, second = save(worlds, tmp_path), save(shipped("balance-2d"), tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "balance-2d.rrd", "balance-2d.summary.json", "snap-2d.rrd", "snap-2d.summary.json", "summary.json",
-    ]  # fmt: skip
+    assert sorted(path.name for path in tmp_path.iterdir()) == files("balance-2d", "snap-2d")
     kept = {path.name: json.loads(path.read_text()) for path in tmp_path.glob("*.json")}
     assert kept["snap-2d.summary.json"] == first.summary
     assert kept["balance-2d.summary.json"] == kept["summary.json"] == second.summary
@@ -56,6 +60,39 @@ def test_one_summary_each_and_the_latest(worlds: Run, shipped: Callable[[str], R
     again = save(worlds, tmp_path)
     assert again.said[0].startswith("replaced ")
     assert json.loads((tmp_path / "summary.json").read_text())["scenario"] == "snap-2d"
+    assert len(list(tmp_path.iterdir())) == len(files("balance-2d", "snap-2d"))
+
+
+def test_no_run_takes_the_place_of_another(worlds: Run, tmp_path: Path) -> None:
+    """Of another seed, or of another model whose file has the same name; the same run takes its own place again."""
+    out, others = tmp_path / "out", [tmp_path / name / "own.xml" for name in ("a", "b")]
+    out.mkdir()
+    runs = [worlds, simulate("snap-2d", worlds=3, seed=3, spread=0.05)]
+    for number, model in enumerate(others):
+        model.parent.mkdir()
+        model.write_text(BOX.replace(".4", f".{4 + number}"))
+        runs.append(simulate(own_object(model, "a/box", "edge"), seconds=0.3, hold=0.1))
+    names = ["snap-2d", "snap-2d-2", "pivot-own-a_box-edge", "pivot-own-a_box-edge-2"]
+    for said in ("wrote ", "replaced "):
+        for run, name in zip(runs, names, strict=True):
+            saved = save(run, out)
+            assert saved.summary["scenario_file"] == f"{name}.scenario.json"
+            assert saved.said[0].startswith(said)
+    assert sorted(path.name for path in out.iterdir()) == files(*names)
+    for run, name in zip(runs, names, strict=True):
+        assert np.array_equal(load(out / f"{name}.scenario.json").wrench, run.wrench)
+    others[0].write_text(BOX.replace(".4", ".6"))  # the same path, and another object
+    changed = simulate(own_object(others[0], "a/box", "edge"), seconds=0.3, hold=0.1)
+    assert save(changed, out).summary["scenario_file"] == "pivot-own-a_box-edge-3.scenario.json"
+
+
+def test_files_of_unknown_runs_are_left_alone(worlds: Run, tmp_path: Path) -> None:
+    """Such as what an earlier version left, which knew no scenario's files."""
+    (tmp_path / "snap-2d.rrd").write_text("mine")
+    (tmp_path / "snap-2d-2.scenario.json").write_text("{")
+    assert save(worlds, tmp_path).summary["recording"] == "snap-2d-3.rrd"
+    assert (tmp_path / "snap-2d.rrd").read_text() == "mine"
+    assert (tmp_path / "snap-2d-2.scenario.json").read_text() == "{"
 
 
 def test_the_worst_world_is_recorded(worlds: Run, tmp_path: Path) -> None:
@@ -98,7 +135,7 @@ def test_recordings_can_be_off(worlds: Run, tmp_path: Path, monkeypatch: pytest.
     assert saved.said[1] == "nothing is recorded: RERUN=0 is set in the environment"
     assert saved.summary["recording"] is None
     assert saved.summary["recorded_world"] is None
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["snap-2d.summary.json", "summary.json"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == files("snap-2d", recorded=False)
     monkeypatch.setenv("RERUN", "on")
     assert save(worlds, tmp_path).summary["recording"] == "snap-2d.rrd"
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 from pivoting import __version__
-from pivoting.sim.console.scenario_options import chosen_scenario, scenario_options
+from pivoting.sim.console.scenario_options import scenario_options
 from pivoting.sim.console.stdout import JsonOutput, console, json_option
 
 # What one command alone needs, as rerun and matplotlib, is imported by that.
@@ -89,27 +89,19 @@ class _RunCommand(click.Command):
 
 
 @cli.command(cls=_RunCommand)
-@click.argument("scenario")
-@click.option("--worlds", type=click.IntRange(min=1), default=1, show_default=True, help="How many worlds.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the initial errors.")
+@click.argument("name", metavar="[SCENARIO]", required=False)
+@click.option(
+    "--scenario", "file", type=click.Path(path_type=Path), help="Run what this file describes, in place of SCENARIO."
+)
+@click.option("--worlds", type=click.IntRange(min=1), help="How many worlds; by default 1, or as the file has it.")
+@click.option("--seed", type=click.IntRange(min=0), help="Of the initial errors; by default 0, or as the file has it.")
 @click.option("--limit", "limits", multiple=True, metavar="KEY=VALUE", help="Change a limit of the verdict.")
 @scenario_options
 @click.option("--open-loop", is_flag=True, help="Plan the whole motion once and apply that, whatever happens.")
-@click.option("--out", type=click.Path(), help="Folder for SCENARIO.rrd, SCENARIO.summary.json and summary.json.")
+@click.option("--out", type=click.Path(), help="Folder for what is kept: recording, arrays, scenario and summary.")
 @click.option("--record-world", type=click.IntRange(min=0), help="Which world is recorded; by default the worst.")
 @json_option("Print the summary as one JSON object and nothing else.")
-def run(
-    scenario: str,
-    worlds: int,
-    seed: int,
-    settings: tuple[str, ...],
-    limits: tuple[str, ...],
-    open_loop: bool,
-    out: str | None,
-    record_world: int | None,
-    as_json: JsonOutput | None,
-    **own: Any,
-) -> int:
+def run(out: str | None, record_world: int | None, as_json: JsonOutput | None, **options: Any) -> int:
     """Run SCENARIO in closed loop in MuJoCo; exit 0 if the verdict passes, 1 if it fails.
 
     The scenario pivot takes an object of your own: --model FILE.xml --body NAME --contact vertex.
@@ -118,21 +110,32 @@ def run(
     weight as it is believed (of a moment at the lever from contact to centre of mass, of a rate per second), 2T twice
     its natural time, sqrt(lever / gravity).
     """
+    from pivoting.sim.console.asked_run import ask, changed_since
     from pivoting.sim.simulation import simulate
 
-    case = chosen_scenario(scenario, settings, limits, open_loop, **own)
-    if record_world is not None and (out is None or record_world >= worlds):
-        allowed = "given with --out" if out is None else f"less than {worlds}, the number of worlds"
+    asked = ask(**options)
+    if record_world is not None and (out is None or record_world >= asked.worlds):
+        allowed = "given with --out" if out is None else f"less than {asked.worlds}, the number of worlds"
         raise click.BadParameter(f"--record-world {record_world}: must be {allowed}")
     folder = None if out is None else _make_folder(out)
-    with _progress(f"{scenario}, {worlds} world{'s' * (worlds > 1)}") as report:
-        finished = simulate(case, worlds, seed, progress=report, open_loop=open_loop)
+    case = asked.scenario
+    with _progress(f"{case.name}, {asked.worlds} world{'s' * (asked.worlds > 1)}") as report:
+        finished = simulate(
+            case,
+            asked.worlds,
+            asked.seed,
+            first_world=asked.first_world,
+            open_loop=asked.open_loop,
+            progress=report,
+        )
+    if told := changed_since(asked, finished):
+        click.echo(f"pivoting: {options['file']}: {told}", err=True)
 
     from pivoting.sim.console.json_values import jsonable
     from pivoting.sim.console.run_tables import print_run
 
     also: dict[str, Any] = {}
-    if finished.verdict == "fail" and not open_loop:
+    if finished.verdict == "fail" and not asked.open_loop:
         from pivoting.sim.judging.advice import tried
 
         also["advice"] = tried(finished, simulate)
@@ -179,6 +182,7 @@ def render(
     At the centre of mass the applied force and moment, at each contact the measured force and the friction cone, and
     the paths of the centre of mass and of a corner. Keys of --set are those of `pivoting run`; no display is needed.
     """
+    from pivoting.sim.console.asked_run import ask
     from pivoting.sim.drawing.offscreen import check_graphics
     from pivoting.sim.drawing.scene_video import Output
     from pivoting.sim.drawing.scene_video import render as write
@@ -187,11 +191,11 @@ def render(
     if scenario is None and own["model"] is None:
         raise click.UsageError("Missing argument 'SCENARIO', or --model FILE.xml --body NAME.")
     scenario = scenario or "pivot"
-    case = chosen_scenario(scenario, settings, (), False, **own)
+    asked = ask(scenario, None, worlds=1, seed=seed, settings=settings, limits=(), open_loop=False, **own)
     output = Output(out, _size(size), fps, speed, time)
     check_graphics()
     with _progress(scenario) as report:
-        finished = simulate(case, 1, seed, first_world=world, progress=report)
+        finished = simulate(asked.scenario, 1, seed, first_world=world, progress=report)
     with _progress(str(out)) as report:
         frames = write(finished, output, progress=report)
     told = f"{frames} frame{'s' * (frames > 1)} of a run of {finished.time[-1]:g} s, verdict: {finished.verdict}"

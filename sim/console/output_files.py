@@ -1,23 +1,25 @@
-"""What a run leaves in a folder: its recording and its summary, named after the scenario, or the object and contact."""
+"""What a run leaves in a folder: recording, arrays, scenario and summary, named after the scenario, or the object."""
 
 import json
 import re
 import shlex
-import signal
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
+from functools import partial
+from itertools import count
 from pathlib import Path
-from threading import current_thread, main_thread
 from typing import Any, NamedTuple
 
 import numpy as np
 from pivoting.sim.console.json_values import jsonable
-from pivoting.sim.drawing.rerun_recording import RecordingOffError, record
-from pivoting.sim.drawing.whole_file import part
+from pivoting.sim.drawing.rerun_recording import RecordingOffError, record, refuse_if_off
 from pivoting.sim.run import Run
+from pivoting.sim.saved_run import SCENARIO, description, is_run, run_files
 from pivoting.sim.scenarios.scenario import Scenario
+from pivoting.sim.scenarios.scenario_file import written
+from pivoting.sim.whole_files import Writer, write_together
 
 LATEST = "summary.json"
+ENDINGS = ("rrd", "nc", SCENARIO, "summary.json")  # of the files of a run
 
 
 class Saved(NamedTuple):
@@ -39,7 +41,9 @@ def stem(case: Scenario) -> str:
 
 
 def save(run: Run, folder: Path, world: int | None = None, *, also: Mapping[str, Any] | None = None) -> Saved:
-    """Write NAME.rrd and NAME.summary.json, which is also the folder's summary.json: all of them, whole, or none.
+    """Write NAME.rrd, NAME.nc, NAME.scenario.json and NAME.summary.json, which is also the folder's summary.json.
+
+    All of them are written, whole, or none. NAME is that of `stem`, with a number behind it if another run has it.
 
     Args:
         run: of `simulate`.
@@ -51,56 +55,42 @@ def save(run: Run, folder: Path, world: int | None = None, *, also: Mapping[str,
         ValueError: there is no such world.
         OSError: a file cannot be written.
     """
-    name = stem(run.scenario)
+    name = _free_name(run, folder)
     chosen = run.worst_world if world is None else world
-    recording: Path | None = folder / f"{name}.rrd"
-    assert recording is not None
-    replaced = recording.exists() or (folder / f"{name}.summary.json").exists()
-    parts: dict[Path, Path] = {}
+    recording: str | None = f"{name}.rrd"
+    writers: dict[str, Writer] = {}
     try:
-        try:
-            parts[recording] = part(recording)
-            record(run, parts[recording], world=chosen)
-            which = (
-                f"world {chosen} of {run.worlds}" + (", the worst," if world is None else "")
-                if run.worlds > 1
-                else "it"
-            )
-            told = f"{which} is in {recording}, see it with: rerun {shlex.quote(str(recording))}"
-        except RecordingOffError as off:
-            parts.clear()
-            recording, told = None, f"nothing is recorded: {off}"
-        summary = {
-            **jsonable(run.summary()),
-            **jsonable(dict(also or {})),
-            "recording": None if recording is None else recording.name,
-            "recorded_world": None if recording is None else chosen,
-        }
-        text = json.dumps(summary, allow_nan=False, indent=1) + "\n"
-        for target in (folder / f"{name}.summary.json", folder / LATEST):
-            parts[target] = part(target)
-            parts[target].write_text(text)
-        with _uninterrupted():
-            for target, file in parts.items():
-                file.replace(target)
-    finally:
-        for file in parts.values():
-            file.unlink(missing_ok=True)
-    wrote = "replaced" if replaced else "wrote"
-    return Saved(summary, [f"{wrote} {folder / f'{name}.summary.json'}, also as {LATEST}", told])
+        refuse_if_off()
+        writers[f"{name}.rrd"] = partial(record, run, world=chosen)
+        which = (
+            f"world {chosen} of {run.worlds}" + (", the worst," if world is None else "") if run.worlds > 1 else "it"
+        )
+        where = folder / f"{name}.rrd"
+        told = f"{which} is in {where}, see it with: rerun {shlex.quote(str(where))}"
+    except RecordingOffError as off:
+        recording, told = None, f"nothing is recorded: {off}"
+    summary = {
+        **jsonable(run.summary()),
+        **jsonable(dict(also or {})),
+        "recording": recording,
+        "recorded_world": None if recording is None else chosen,
+        "scenario_file": f"{name}.{SCENARIO}",
+    }
+    text = json.dumps(summary, allow_nan=False, indent=1) + "\n"
+    writers |= run_files(run, f"{name}.nc", f"{name}.{SCENARIO}")
+    writers |= dict.fromkeys((f"{name}.summary.json", LATEST), lambda part: part.write_text(text))
+    wrote = "replaced" if (folder / f"{name}.summary.json").exists() else "wrote"
+    write_together(folder, writers)
+    with_it = f"with {name}.nc and {name}.{SCENARIO}"
+    return Saved(summary, [f"{wrote} {folder / f'{name}.summary.json'}, also as {LATEST}, {with_it}", told])
 
 
-@contextmanager
-def _uninterrupted() -> Iterator[None]:
-    """A SIGINT that comes meanwhile is sent again when this is over."""
-    if current_thread() is not main_thread():  # an interrupt is raised in that one alone
-        yield
-        return
-    came: list[int] = []
-    handler = signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, handler)
-        for number in came[:1]:
-            signal.raise_signal(number)
+def _free_name(run: Run, folder: Path) -> str:
+    """The run's own name in the folder, with a number behind it if another run's files have that name."""
+    first, here = stem(run.scenario), written(description(run))
+    for number in count(1):
+        name = first if number == 1 else f"{first}-{number}"
+        taken = [path for ending in ENDINGS if (path := folder / f"{name}.{ending}").exists()]
+        if not taken or is_run(folder / f"{name}.{SCENARIO}", here):
+            return name
+    raise AssertionError("there are as many names as numbers")

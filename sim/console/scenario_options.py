@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -25,32 +25,13 @@ OPTIONS = (
 
 
 def scenario_options(command: Callable[..., int]) -> Callable[..., int]:
-    """Give a command the `OPTIONS`, which `chosen_scenario` takes: the keys first, the others as keywords."""
+    """Give a command the `OPTIONS`, of which `asked_run.ask` makes a scenario."""
     for option in reversed(OPTIONS):  # as decorators are applied
         command = option(command)
     return command
 
 
-def chosen_scenario(
-    scenario: str, settings: tuple[str, ...], limits: tuple[str, ...], open_loop: bool, **own: Any
-) -> "Scenario":
-    """The scenario of this name with what is set of it, or that of an object of one's own."""
-    from pivoting.sim.scenarios.shipped_scenarios import OWN
-    from pivoting.sim.scenarios.shipped_scenarios import scenario as find
-
-    changes: dict[str, Any] = _pairs("--set", settings)
-    if "limits" in changes:
-        raise click.BadParameter("--set limits: must be --limit KEY=VALUE")
-    changes["limits"] = _pairs("--limit", limits)
-    case = (_own(**own) if scenario == OWN else find(scenario)).change(**changes)
-    case.refuse_without_effect(case.given, open_loop)
-    given = [key for key, value in own.items() if value is not None and value is not False]
-    if given and not case.own:
-        raise click.BadParameter(f"--{given[0].replace('_', '-')}: only the scenario {OWN} takes it, not {scenario!r}")
-    return case
-
-
-def _own(
+def own_scenario(
     model: Path | None, body: str | None, contact: str | None, support: str | None, as_modelled: bool
 ) -> "Scenario":
     """The scenario of an object of one's own."""
@@ -70,9 +51,10 @@ def _own(
     return own_object(model, body, where, support=support, chosen=not as_modelled)
 
 
-def _pairs(option: str, pairs: tuple[str, ...]) -> dict[str, str]:
+def pairs(option: str, given: tuple[str, ...]) -> dict[str, str]:
+    """KEY=VALUE by key."""
     out: dict[str, str] = {}
-    for pair in pairs:
+    for pair in given:
         key, equals, value = pair.partition("=")
         if not equals or not key or not value:
             raise click.BadParameter(f"{option} {pair!r}: must be KEY=VALUE")

@@ -50,9 +50,9 @@ from pivoting.sim.drawing.colours import (
 from pivoting.sim.drawing.drawn_world import BOLD, THIN, UP, Array
 from pivoting.sim.drawing.recorded_world import PLOTS, SCENE, Film, xyzw
 from pivoting.sim.drawing.recording_id import digest
-from pivoting.sim.drawing.whole_file import whole
 from pivoting.sim.judging.measures import predicted_slip
 from pivoting.sim.run import Run
+from pivoting.sim.whole_files import whole
 
 OFF = ("off", "false", "0")  # of RERUN, as rerun reads it
 QUAD = [[0, 1, 2], [0, 2, 3]]  # triangles of four corners
@@ -84,6 +84,12 @@ class RecordingOffError(RuntimeError):
     """The environment says that nothing is to be recorded."""
 
 
+def refuse_if_off() -> None:
+    """Raise RecordingOffError if nothing is to be recorded."""
+    if os.environ.get("RERUN", "").lower() in OFF:
+        raise RecordingOffError(f"RERUN={os.environ['RERUN']} is set in the environment")
+
+
 def record(run: Run, path: str | os.PathLike[str], *, world: int | None = None) -> Path:
     """Write one world of a finished run to `path` (.rrd) and return it; `rerun PATH` shows it.
 
@@ -107,8 +113,7 @@ def record(run: Run, path: str | os.PathLike[str], *, world: int | None = None) 
     world = run.worst_world if world is None else world
     if isinstance(world, bool) or not isinstance(world, int | np.integer) or not 0 <= world < run.worlds:
         raise fail("world", world, f"a whole number in [0, {run.worlds})")
-    if os.environ.get("RERUN", "").lower() in OFF:
-        raise RecordingOffError(f"RERUN={os.environ['RERUN']} is set in the environment")
+    refuse_if_off()
     import rerun as rr  # takes a second
 
     strict = rr.strict_mode()

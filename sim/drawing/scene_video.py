@@ -18,8 +18,8 @@ from pivoting.sim.drawing.drawn_world import DrawnWorld
 from pivoting.sim.drawing.mujoco_scene import LEGEND, MujocoScene
 from pivoting.sim.drawing.offscreen import OffScreen
 from pivoting.sim.drawing.picture_files import write_gif, write_mp4, write_png
-from pivoting.sim.drawing.whole_file import whole
 from pivoting.sim.run import Run
+from pivoting.sim.whole_files import whole
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pivoting.controller.solution import Solution
 from pivoting.controller.solution_space import solution_space
-from pivoting.sim.drawing.whole_file import whole
+from pivoting.sim.whole_files import whole
 
 ORANGE, BLUE, BLACK, RED, GREEN = "#e08a1e", "#2f6db3", "#222222", "#c0392b", "#2e8b57"
 

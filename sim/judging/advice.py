@@ -268,7 +268,7 @@ def tried(run: "Run", simulate: Callable[..., "Run"], most: int = TRIES) -> dict
     while left and len(failed) < most:
         one = left.pop(0)
         try:
-            again = simulate(scenario.change(**one.keys), run.worlds, run.seed)
+            again = simulate(scenario.change(**one.keys), run.worlds, run.seed, first_world=run.first_world)
         except (ValueError, RuntimeError):  # the key does not fit the scenario: it is no remedy
             continue
         if again.verdict == "pass":
