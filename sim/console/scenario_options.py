@@ -1,4 +1,4 @@
-"""The options of commands that run something: a scenario with keys that are set, or an object of one's own."""
+"""The options of commands that run a scenario, or an object of the user's own."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -25,14 +25,14 @@ OPTIONS = (
 
 
 def scenario_options(command: Callable[..., int]) -> Callable[..., int]:
-    """Give a command the `OPTIONS`, which `chosen_scenario` takes: the keys first, the others as keywords."""
+    """Add the `OPTIONS` to a command; `chosen_scenario` takes their values."""
     for option in reversed(OPTIONS):  # as decorators are applied
         command = option(command)
     return command
 
 
 def chosen_scenario(scenario: str, settings: tuple[str, ...], limits: tuple[str, ...], **own: Any) -> "Scenario":
-    """The scenario of this name with what is set of it, or that of an object of one's own."""
+    """The scenario of this name, or of the user's own object, with the changes of --set and --limit."""
     from pivoting.sim.scenarios.shipped_scenarios import scenario as find
 
     changes: dict[str, Any] = _pairs("--set", settings)

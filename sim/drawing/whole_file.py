@@ -1,4 +1,4 @@
-"""Files that appear, or are replaced, when they are whole."""
+"""Writing a file whole or not at all."""
 
 import os
 from collections.abc import Iterator
@@ -8,7 +8,7 @@ from pathlib import Path
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """Where to write what is then at `path`; if that fails nothing is left, and what was there stays."""
+    """Yield a temporary path that replaces `path` on success; on failure it is removed and `path` is untouched."""
     partial = part(path)
     try:
         yield partial
@@ -18,5 +18,5 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def part(path: Path) -> Path:
-    """The file beside it that is written first, another one for each process."""
+    """The temporary file next to `path`, with a name of its own for each process."""
     return path.with_name(f".{path.name}.{os.getpid()}.part")
