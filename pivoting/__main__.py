@@ -98,7 +98,7 @@ def _command(interrupt: _Interrupt) -> Callable[[], int]:
     kept = os.dup(1)
     os.dup2(2, 1)
     graphics = os.environ.get("MUJOCO_GL")
-    os.environ["MUJOCO_GL"] = "disable"  # mujoco's import would fail where there is none; what draws looks for itself
+    os.environ["MUJOCO_GL"] = "disable"  # else a missing library fails every command; `render` looks for one itself
     try:
         before_compiling.append(partial(_watch_compilers, interrupt))
         from pivoting.sim.console.command_line import main as command

@@ -48,7 +48,7 @@ def write_together(folder: Path, writers: Mapping[str, Writer]) -> None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """Where to write what is then at `path`; if that fails nothing is left, and what was there stays."""
+    """Yield a temporary path that replaces `path` on success; on failure it is removed and `path` is untouched."""
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         yield part

@@ -158,13 +158,19 @@ def run(out: str | None, record_world: int | None, as_json: JsonOutput | None, *
 @cli.command()
 @click.argument("scenario", required=False)
 @scenario_options
-@click.option("--world", type=click.IntRange(min=0), default=0, show_default=True, help="Which of many worlds.")
+@click.option(
+    "--world",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Which world, counted from 0.",
+)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the initial errors.")
-@click.option("--out", type=click.Path(path_type=Path), required=True, help="The file, .gif, .mp4 or .png.")
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="File to write: .gif, .mp4 or .png.")
 @click.option("--size", default="640x480", show_default=True, metavar="WxH", help="Width and height in pixels.")
-@click.option("--fps", type=int, help="Frames a second of a moving picture.  [default: 25]")
-@click.option("--speed", type=float, help="Of it: 1 is real time, 0.5 half as fast.  [default: 1]")
-@click.option("--time", type=float, help="Of one picture, a .png file, s.  [default: the middle of the run]")
+@click.option("--fps", type=int, help="Frames a second of a video.  [default: 25]")
+@click.option("--speed", type=float, help="Speed of a video: 1 is real time, 0.5 half as fast.  [default: 1]")
+@click.option("--time", type=float, help="Time that a .png file shows, s.  [default: the middle of the run]")
 def render(
     scenario: str | None,
     settings: tuple[str, ...],
@@ -177,10 +183,11 @@ def render(
     time: float | None,
     **own: Any,
 ) -> int:
-    """Draw a run of SCENARIO, or of an object of your own, as MuJoCo renders it; exit 0 if that is written.
+    """Run SCENARIO, or an object of your own, and draw it with MuJoCo's renderer; exit 0 once the file is written.
 
-    At the centre of mass the applied force and moment, at each contact the measured force and the friction cone, and
-    the paths of the centre of mass and of a corner. Keys of --set are those of `pivoting run`; no display is needed.
+    It shows the applied force and moment at the centre of mass, the measured force and the friction cone at each
+    contact, and the paths of the centre of mass and of a corner. --set takes the keys of `pivoting run`. No display is
+    needed.
     """
     from pivoting.sim.console.asked_run import ask
     from pivoting.sim.drawing.offscreen import check_graphics
@@ -270,7 +277,7 @@ def _refuse(message: str) -> int:
 
 
 def _size(text: str) -> tuple[int, int]:
-    """Of a picture, as WIDTHxHEIGHT."""
+    """Width and height of a picture."""
     width, _, height = text.partition("x")
     if not (width.isdecimal() and height.isdecimal()):
         raise click.BadParameter(f"--size {text!r}: must be WIDTHxHEIGHT, such as 640x480")

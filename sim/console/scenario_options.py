@@ -1,4 +1,4 @@
-"""The options of commands that run something: a scenario with keys that are set, or an object of one's own."""
+"""The options of commands that run a scenario, or an object of the user's own."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A camera that has all of some points in view, from a given direction, as near as it can be."""
+"""A camera that looks in a given direction and is as close as it can be with a set of points in view."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ ROOM = 0.94  # share of the picture that the points may fill
 
 
 class Camera(NamedTuple):
-    """eye: (3,) where it is [m].  forward, up: (3,) unit vectors.  high: tangent of half its vertical angle."""
+    """eye: (3,) its position [m].  forward, up: (3,) unit vectors.  high: tangent of half the vertical view angle."""
 
     eye: Array
     forward: Array
@@ -24,7 +24,7 @@ class Camera(NamedTuple):
         return (points - self.eye) @ self.forward
 
     def aim(self, scene: mujoco.MjvScene, near: float, far: float) -> None:
-        """Look at a scene with it, which is seen from `near` to `far` [m] in front of it."""
+        """Make it the camera of a scene, with clipping planes `near` and `far` [m] in front of it."""
         for camera in scene.camera:  # left and right eye
             camera.pos[:], camera.forward[:], camera.up[:] = self.eye, self.forward, self.up
             camera.orthographic, camera.frustum_center, camera.frustum_width = 0, 0.0, 0.0
@@ -34,15 +34,15 @@ class Camera(NamedTuple):
 
 
 def fitted(points: Array, towards: Array, up: Array, aspect: float) -> Camera:
-    """The nearest camera that has all points (P, 3) in view.
+    """The closest camera that has all points (P, 3) in view.
 
-    A point p is left of the right edge if (p - eye) . right <= wide (p - eye) . forward, and so on; of each pair of
-    edges that gives how far forward the eye may be, and there where it is across.
+    A point p is inside the right edge if (p - eye) . right <= slope (p - eye) . forward, and likewise for the other
+    edges. Each pair of opposite edges bounds how far forward the eye can be, and says where it is sideways then.
 
     Args:
         points: world axes [m].
-        towards: (3,) from what is seen to the eye.  up: (3,) which way is up.
-        aspect: width of the picture by its height.
+        towards: (3,) from the points to the eye.  up: (3,) the upward direction.
+        aspect: width of the picture divided by its height.
     """
     forward = -towards / np.linalg.norm(towards)
     right = np.cross(forward, up)

@@ -1,4 +1,4 @@
-"""Words above a picture of a run: what each colour stands for, and when it is."""
+"""The caption above a picture of a run: what each colour stands for, the time and the angle."""
 
 from typing import NamedTuple
 
@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 from pivoting.sim.drawing.colours import DARK, WHITE, Colour
 
-LEAST = 11  # pixels of a letter's height, in however small a picture
-SHARE = 38  # of the shorter side that it otherwise has, one in so many
+LEAST = 11  # smallest font size [pixels]
+SHARE = 38  # shorter side of the picture divided by the font size, where that is larger
 
 
 class Caption(NamedTuple):
-    """Rows of coloured words, as many as are needed; `room` at the end of the last one."""
+    """A legend of coloured entries, set in rows of `width` pixels in a font of this size [pixels]."""
 
     width: int
     size: float
@@ -20,11 +20,11 @@ class Caption(NamedTuple):
 
     @property
     def height(self) -> int:
-        """Pixels of height."""
+        """Of the strip that it takes [pixels]."""
         return round((1.7 * len(self.rows) + 0.5) * self.size)
 
     def above(self, picture: NDArray[np.uint8], when: str) -> NDArray[np.uint8]:
-        """(height + H, width, 3) a picture (H, width, 3) under these words, with `when` at the end of the last row."""
+        """(height + H, width, 3) a picture (H, width, 3) below the caption, with `when` at the end of its last row."""
         strip = Image.new("RGB", (self.width, self.height), DARK)
         draw, font = ImageDraw.Draw(strip), ImageFont.load_default(self.size)
         for k, row in enumerate(self.rows):
@@ -39,7 +39,7 @@ class Caption(NamedTuple):
 
 
 def caption(legend: list[tuple[str, Colour]], when: str, width: int, height: int) -> Caption:
-    """The words of a legend, set for pictures of `width` x `height` pixels, and room for `when`."""
+    """Set a legend for pictures of `width` x `height` pixels, with room for `when`."""
     size = max(LEAST, min(width, height) / SHARE)
     rows: list[list[tuple[str, Colour]]] = [[]]
     left = width - size
@@ -55,5 +55,5 @@ def caption(legend: list[tuple[str, Colour]], when: str, width: int, height: int
 
 
 def _wide(words: str, size: float) -> float:
-    """Of an entry, with what is before and after the words."""
+    """Width of an entry with its coloured square and the space after it [pixels]."""
     return float(ImageFont.load_default(size).getlength(words)) + 2.2 * size

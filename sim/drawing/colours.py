@@ -1,4 +1,4 @@
-"""The colours of what is drawn, the same in recordings and in pictures of the scene: red, green and blue of 255."""
+"""Colours shared by recordings and pictures of the scene, as red, green and blue from 0 to 255."""
 
 Colour = tuple[int, int, int]
 
@@ -8,4 +8,4 @@ ORANGE, YELLOW = (255, 150, 40), (250, 215, 90)  # predicted contact force: all 
 RED, PINK = (225, 60, 70), (250, 150, 170)  # measured, likewise
 PURPLE, GREY, WHITE = (165, 130, 235), (170, 170, 170), (235, 235, 235)  # planned cone; the world's, weight; the rest
 BLOCK, EDGES, TABLE, DARK = (70, 105, 145), (150, 185, 225), (120, 112, 100), (24, 26, 30)
-GLASS = 60  # opacity of 255: of the body in space, and of the cones
+GLASS = 60  # opacity, from 0 to 255, of the body in space and of the friction cones

@@ -1,4 +1,4 @@
-"""One world of a run as it is drawn: up to where it diverges, in which sizes, and the arrows of what happened."""
+"""One world of a run, ready to be drawn: the states before it diverges, sizes, and arrows for forces and moments."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,7 +23,7 @@ BOLD, THIN = 0.02, 0.012  # radii of the arrows of the applied wrench, and of th
 
 @dataclass(frozen=True, eq=False)
 class DrawnWorld:
-    """One world of a run up to where it diverges, and the sizes it is drawn with."""
+    """One world of a run up to where it diverges, and the sizes that it is drawn with."""
 
     run: Run
     world: int
@@ -109,9 +109,9 @@ class DrawnWorld:
 
     @property
     def along_axis(self) -> Array:
-        """(3,) the level unit vector into the picture along the axis that the object turns about, world axes.
+        """(3,) horizontal unit vector into the picture along the axis of rotation, world axes.
 
-        Counter-clockwise turns are then seen as such; `away` of an object that turns about the vertical.
+        A positive rotation then looks counter-clockwise. If the axis is vertical this is `away`.
         """
         axis, up = self.run.world.turn[0], upward(self.model)
         level = up * (axis @ up) - axis
@@ -119,7 +119,7 @@ class DrawnWorld:
         return level / size if size > 0.5 else self.away
 
     def eye(self, into: Array) -> Array:
-        """(3,) from the centre of the picture to where it is seen from, with `into` (3,) into it, world axes [m]."""
+        """(3,) from the centre of the picture to the viewer, who looks along `into` (3,), world axes [m]."""
         up = upward(self.model)
         return self.side * np.array(EYE[self.dim]) @ np.array([np.cross(into, up), -into, up])
 
@@ -159,12 +159,12 @@ class DrawnWorld:
 
     @property
     def thick(self) -> float:
-        """Radius of the arrows of predicted contact forces; those of measured ones have twice that [m]."""
+        """Radius of the arrows for predicted contact forces; those for measured forces are twice as thick [m]."""
         return (0.015 if self.dim == 2 else 0.012) * self.side
 
     @property
     def slab(self) -> Array:
-        """(3,) half sizes of the piece of a table without end that is drawn, table axes [m]."""
+        """(3,) half sizes of the slab that is drawn for an infinite table, table axes [m]."""
         return self.side * np.array([2.0, 0.5, 0.03] if self.dim == 2 else [1.3, 1.1, 0.03])
 
     def applied(self, rows: Rows) -> Array:
@@ -176,7 +176,7 @@ class DrawnWorld:
         return self.run.wrench_world[self.world, rows, 3:] / self.length * self.scale
 
     def moment_arcs(self, rows: Rows) -> Array:
-        """(R, 28, 3) the applied moment as an arc about the CoM, in space about its own axis, world axes [m].
+        """(R, 28, 3) the applied moment as an arc around the CoM, in space in the plane normal to it, world axes [m].
 
         270 deg stand for what the moments usually stay below, or for a tenth of m g at the corner's lever if more.
         """
@@ -205,7 +205,7 @@ class DrawnWorld:
         return np.stack([lift(force[:, i]) for i in range(force.shape[1])], axis=1)
 
     def cone(self, i: int, *, planned: bool) -> tuple[Array, NDArray[np.int64], list[Array]]:
-        """Of contact i, table axes, see `shapes.cone`: the one that the controller keeps to, or the world's [m]."""
+        """The friction cone of contact i, planned or the world's, in table axes [m]; see `shapes.cone`."""
         mu = float(self.planned_mu[i]) if planned else self.run.world.mu
         floor = self.scale * self.run.attached.controller.contacts[i].f_min
         tall = 0.8 if self.dim == 2 else 0.45
@@ -219,9 +219,9 @@ def usual(values: Array) -> float:
 
 
 def _planes_across(vectors: Array) -> Array:
-    """(N, 3, 2) axes of the plane across each of `vectors` (N, 3), which turns counter-clockwise about it.
+    """(N, 3, 2) two axes of the plane normal to each of `vectors` (N, 3), right-handed about it.
 
-    The first is also across that one of the world's axes which none of them comes near.
+    The first is also normal to the world axis that the vectors stay farthest from, so that it varies smoothly.
     """
     size = np.linalg.norm(vectors, axis=1, keepdims=True)
     axis = np.divide(vectors, size, out=np.zeros_like(vectors), where=size > 0.0)

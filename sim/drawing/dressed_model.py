@@ -1,4 +1,4 @@
-"""A run's model as it is drawn: in the colours of recordings, without what moves otherwise or is in the way."""
+"""A copy of a run's model to draw: coloured like a recording, without other moving bodies and obstructions."""
 
 import copy
 
@@ -10,15 +10,15 @@ from pivoting.sim.drawing.colours import BLOCK, GLASS, TABLE
 from pivoting.sim.drawing.drawn_world import DrawnWorld
 
 Array = NDArray[np.float64]
-SHOWN = 3  # groups of geoms that MuJoCo shows
-RAYS = 1_000  # at most, from the camera to what is to be seen
+SHOWN = 3  # MuJoCo shows the geom groups below this one
+RAYS = 1_000  # at most, from the camera to the points that have to be visible
 
 
 def dressed(film: DrawnWorld, size: float, width: int, height: int) -> mujoco.MjModel:
-    """A copy of the model, for pictures of `width` x `height` pixels of something of this size [m].
+    """A copy of the model for pictures of `width` x `height` pixels in which everything together has this size [m].
 
-    Of the object those geoms are seen that MuJoCo shows, or, if it shows none of them, those that collide. What else
-    can move is hidden, as a run does not hold where it is, and so is a table without end, of which a slab is drawn.
+    The object shows its visible geoms, or its colliding ones if none is visible. Other movable bodies are hidden,
+    because a run does not record where they are, and so is an infinite table, in place of which a slab is drawn.
     """
     model = copy.copy(film.model)
     body, surface = film.run.truth.index, film.run.truth.surface
@@ -30,12 +30,13 @@ def dressed(film: DrawnWorld, size: float, width: int, height: int) -> mujoco.Mj
     if np.isinf(surface.thick):
         _hide(model, [surface.geom])
     model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+    model.vis.quality.offsamples, model.vis.quality.shadowsize = 4, 0
     model.stat.extent = size
     return model
 
 
 def clear_view(model: mujoco.MjModel, data: mujoco.MjData, film: DrawnWorld, eye: Array, points: Array) -> None:
-    """Hide of the surroundings, but for the support, each geom that is between the eye (3,) and a point of (P, 3)."""
+    """Hide the geoms, other than the support and the object, between the eye (3,) and any of the points (P, 3)."""
     hit = np.array([-1], np.int32)
     mujoco.mj_fwdPosition(model, data)
     for point in points[:: max(1, len(points) // RAYS)]:
@@ -46,8 +47,8 @@ def clear_view(model: mujoco.MjModel, data: mujoco.MjData, film: DrawnWorld, eye
 
 
 def _opacity(model: mujoco.MjModel, geoms: NDArray[np.intp]) -> Array:
-    """(G,) of a geom's own colour, or that of its material."""
-    materials = np.append(model.mat_rgba[:, 3], 1.0)  # the last for those that have none
+    """(G,) the opacity of each geom, or of its material if that is less."""
+    materials = np.append(model.mat_rgba[:, 3], 1.0)  # the last one is for geoms without a material
     return np.minimum(materials[model.geom_matid[geoms]], model.geom_rgba[geoms, 3])
 
 
@@ -58,5 +59,5 @@ def _paint(model: mujoco.MjModel, geoms: ArrayLike, colour: tuple[int, ...]) -> 
 
 
 def _hide(model: mujoco.MjModel, geoms: ArrayLike) -> None:
-    _paint(model, geoms, (0, 0, 0, 0))  # by which rays pass
+    _paint(model, geoms, (0, 0, 0, 0))  # rays pass through what is transparent
     model.geom_group[geoms] = SHOWN

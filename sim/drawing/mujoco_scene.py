@@ -1,8 +1,9 @@
-"""One world of a run as a MuJoCo scene: the model's own geoms, and as further ones what recordings show as well.
+"""One world of a run as a MuJoCo scene: the model's geoms, and what happened to the object as additional geoms.
 
-The applied wrench at the CoM, at the contacts the measured forces and the planned friction cones, and the paths of the
-CoM, of the contacts and of the body's farthest corner; all of it out of the arrays of the run. In space the object is
-half transparent and throws a shadow straight down, in the plane arrows are before it and the weight is one of them.
+These are the applied force and moment at the CoM, the measured forces and planned friction cones at the contacts, and
+the paths of the CoM, of the contacts and of the corner farthest from them, all taken from the arrays of the run. In
+space the object is translucent and casts a shadow straight down; in the plane the arrows are in front of it, and its
+weight is drawn as well.
 """
 
 from collections.abc import Iterator
@@ -21,10 +22,11 @@ from pivoting.sim.drawing.dressed_model import clear_view, dressed
 from pivoting.sim.drawing.scene_geoms import GLOW, add_arrow, add_box, add_path, add_surface
 from pivoting.sim.drawing.shapes import shadow
 
-POSES = 60  # of which the camera has all in view
-DOTS = 200  # of a path, at most
-SHADE = 110  # opacity of a shadow, of 255
-SUN = np.array([0.35, 0.25, -1.0])  # where its light goes: to the right, away from us and down
+POSES = 60  # times at which everything has to be in the camera's view
+DOTS = 200  # points of a path, at most
+OTHERS = 200  # geoms, at most, that are added for the wrench and for each contact
+SHADE = 110  # opacity of the shadow, from 0 to 255
+SUN = np.array([0.35, 0.25, -1.0])  # direction of its light: to the right, into the picture and down
 WORDS = [("applied force", GREEN), ("applied moment", TEAL), ("contact force", RED), ("friction cone", PURPLE)]
 LEGEND = {2: [*WORDS, ("weight", GREY)], 3: WORDS}
 EVERY = mujoco.mjtCatBit.mjCAT_ALL.value
@@ -32,15 +34,15 @@ GEOM = mujoco.mjtObj.mjOBJ_GEOM.value
 
 
 class MujocoScene:
-    """A world of a run, from a camera that has the whole of it in view.
+    """One world of a run, seen by a camera that has the whole motion in view.
 
     Attributes:
-        model: that is drawn, see `dressed_model`.
-        scene: as it was shown last.
+        model: what is drawn, see `dressed_model`.
+        scene: the one shown last.
     """
 
     def __init__(self, film: DrawnWorld, width: int, height: int):
-        """In pictures of `width` x `height` pixels."""
+        """For pictures of `width` x `height` pixels."""
         self._film = film
         self._paths = list(_paths(film))
         points = np.concatenate([*_extent(film), *self._paths])
@@ -50,7 +52,8 @@ class MujocoScene:
         self._data = initial_data(self.model)
         self._data.qpos[:] = film.run.start[0][film.world]
         clear_view(self.model, self._data, film, self._camera.eye, points)
-        self.scene = mujoco.MjvScene(self.model, self.model.ngeom + 2_000 + 200 * len(film.tags))
+        lines = sum(len(solid.lines) for solid in film.solids) + DOTS * len(self._paths)
+        self.scene = mujoco.MjvScene(self.model, self.model.ngeom + lines + OTHERS * (1 + len(film.tags)))
         self._option = mujoco.MjvOption()
         self._option.sitegroup[:] = 0
 
@@ -68,14 +71,15 @@ class MujocoScene:
             add_path(scene, path, GREY)
         self._camera.aim(scene, 0.01 * self._size, 100.0 * self._size)
         for geom in scene.geoms[: scene.ngeom]:
-            geom.camdist = self._camera.depth(geom.pos)  # by which what is transparent is sorted
+            geom.camdist = self._camera.depth(geom.pos)  # MuJoCo sorts translucent geoms by it
         self._light()
         return scene
 
     def _light(self) -> None:
-        """Ours, whatever the model has: from the camera, from straight above, and from the sun; no sky."""
+        """Replace the model's lights by three directional ones: along the view, straight down and from the sun."""
         scene, up, into = self.scene, upward(self._film.model), self._film.along_axis
-        scene.flags[[mujoco.mjtRndFlag.mjRND_SKYBOX.value, mujoco.mjtRndFlag.mjRND_HAZE.value]] = 0
+        scene.flags[:] = 0  # no sky, no fog
+        scene.flags[mujoco.mjtRndFlag.mjRND_CULL_FACE.value] = 1
         sun = SUN @ np.array([np.cross(into, up), into, up]) / np.linalg.norm(SUN)
         lights = (self._camera.forward, 0.3), (-up, 0.3), (sun, 0.35)
         scene.nlight = len(lights)
@@ -87,7 +91,7 @@ class MujocoScene:
 
 
 def _extent(film: DrawnWorld) -> Iterator[Array]:
-    """Points (..., 3) of all that is to be seen: the body, the arrows and the cones, at times of the whole run."""
+    """Points (..., 3) that have to be in view: the body, its shadow, arrows and cones, at times of the whole run."""
     run, i, axes = film.run, film.world, film.run.table_axes
     rows = np.unique(np.linspace(0, film.answers - 1, POSES).astype(int))
     position, quaternion = run.position[i, rows], run.quaternion[i, rows]
@@ -105,7 +109,7 @@ def _extent(film: DrawnWorld) -> Iterator[Array]:
 
 
 def _paths(film: DrawnWorld) -> Iterator[Array]:
-    """(P, 3) where the CoM, each contact and the corner of the body that is farthest from them go, world axes [m]."""
+    """Paths (P, 3) of the CoM, of the corner of the body farthest from the contacts, and of the contacts [m]."""
     run, i = film.run, film.world
     rows = np.unique(np.linspace(0, film.answers - 1, DOTS).astype(int))
     vertices = _vertices(film)
@@ -116,20 +120,20 @@ def _paths(film: DrawnWorld) -> Iterator[Array]:
 
 
 def _vertices(film: DrawnWorld) -> Array:
-    """(V, 3) of the body, object axes [m]."""
+    """(V, 3) vertices of the body, object axes [m]."""
     return np.concatenate([solid.vertices for solid in film.solids])
 
 
 def _posed(film: DrawnWorld, row: Rows, points: Array) -> Array:
-    """(..., 3) points (..., 3) of the object at the beginning of a step, world axes [m]."""
+    """(..., 3) where points (..., 3) of the object are at the beginning of a step, world axes [m]."""
     return film.run.position[film.world, row] + rotated(film.run.quaternion[film.world, row], points)
 
 
 def _draw_table(scene: mujoco.MjvScene, film: DrawnWorld, row: Rows) -> None:
-    """Of a table that has no end a slab; in space also the shadow."""
+    """The slab that stands for an infinite table, and in space the shadow."""
     run, surface, half = film.run, film.run.truth.surface, film.slab
     if film.dim == 2:
-        half = np.array([half[0], film.depth, half[2]])  # arrows are before it, too
+        half = np.array([half[0], film.depth, half[2]])  # so that it hides no arrow
     if np.isinf(surface.thick):
         top = run.truth.origin + run.table_axes @ film.start
         add_box(scene, top - run.table_axes @ (half * UP), run.table_axes, half, TABLE)
@@ -151,7 +155,7 @@ def _draw_edges(scene: mujoco.MjvScene, film: DrawnWorld, row: Rows) -> None:
 
 
 def _draw_wrench(scene: mujoco.MjvScene, film: DrawnWorld, row: Rows) -> None:
-    """At the CoM the applied force and moment; in the plane, where it is before the table, also the weight."""
+    """The applied force and moment at the CoM; in the plane, where the table does not hide it, also the weight."""
     (at,) = film.run.position[film.world, row] + film.front
     if film.dim == 2:
         add_arrow(scene, at, film.weight * film.scale, GREY, THIN * film.side)
@@ -160,7 +164,7 @@ def _draw_wrench(scene: mujoco.MjvScene, film: DrawnWorld, row: Rows) -> None:
 
 
 def _draw_contacts(scene: mujoco.MjvScene, film: DrawnWorld, row: Rows) -> None:
-    """At each contact the measured force, and the friction cone that the controller keeps to."""
+    """The measured force at each contact, and the friction cone that the controller stays within."""
     axes = film.run.table_axes
     measured = film.measured(row)[0] @ axes.T
     for k, at in enumerate(film.corner[row[0]] + film.front):
@@ -175,6 +179,6 @@ def _draw_contacts(scene: mujoco.MjvScene, film: DrawnWorld, row: Rows) -> None:
 
 
 def _far_side(corners: Array, triangles: NDArray[np.int64], eye: Array) -> NDArray[np.int64]:
-    """Those of the outward triangles (M, 3) which are turned away from the eye, from within: arrows are before them."""
+    """Those outward triangles (M, 3) that face away from the eye, turned inward: they do not hide the force arrow."""
     first, second, third = np.moveaxis(corners[triangles], 1, 0)
     return triangles[np.cross(second - first, third - first) @ eye < 0.0][:, ::-1]

@@ -1,7 +1,7 @@
-"""Pictures of MuJoCo scenes by MuJoCo's own renderer, off screen: it needs OpenGL, but no display.
+"""Rendering MuJoCo scenes off screen with MuJoCo's own renderer, which needs OpenGL but no display.
 
-MUJOCO_GL says through what, as everywhere in MuJoCo: egl (the default on Linux), osmesa, glfw (which needs a display),
-cgl. It is read when the first picture is made, not when mujoco is imported.
+As everywhere in MuJoCo, the environment variable MUJOCO_GL selects the OpenGL backend: egl (the default on Linux),
+osmesa, glfw (which needs a display) or cgl. Here it is read when it is needed, not when mujoco is imported.
 """
 
 import os
@@ -25,18 +25,18 @@ HELP = (
 
 
 class GraphicsError(OSError):
-    """This machine has no OpenGL to draw with; the message says what to install and which variable to set."""
+    """This machine has no OpenGL to render with; the message says what to install and which variable to set."""
 
 
 class OffScreen:
-    """Where scenes of one model are drawn; as a context, which gives back what the graphics library holds.
+    """A context manager that renders scenes of one model.
 
     Raises:
-        GraphicsError: there is no OpenGL.
+        GraphicsError: OpenGL is missing.
     """
 
     def __init__(self, model: mujoco.MjModel, width: int, height: int):
-        """Of `width` x `height` pixels, which are not more than the model's `offwidth` and `offheight`."""
+        """Pictures have `width` x `height` pixels, at most the model's `offwidth` x `offheight`."""
         self._picture = np.empty((height, width, 3), np.uint8)
         self._all = mujoco.MjrRect(0, 0, width, height)
         self._context = _context(width, height)
@@ -48,7 +48,7 @@ class OffScreen:
             raise _error(error) from error
 
     def draw(self, scene: mujoco.MjvScene) -> Picture:
-        """(height, width, 3) the scene, red, green and blue of 255; black where there is nothing."""
+        """(height, width, 3) red, green and blue of the scene from 0 to 255; the background is black."""
         mujoco.mjr_render(self._all, scene, self._renderer)
         mujoco.mjr_readPixels(self._picture, None, self._all, self._renderer)
         return self._picture[::-1].copy()
@@ -62,10 +62,10 @@ class OffScreen:
 
 
 def check_graphics() -> None:
-    """Find out before the work that there is something to draw with.
+    """Find out before the work whether this machine can render.
 
     Raises:
-        GraphicsError: there is not.
+        GraphicsError: OpenGL is missing.
     """
     with OffScreen(mujoco.MjModel.from_xml_string("<mujoco/>"), 1, 1):
         pass
@@ -77,19 +77,19 @@ def _backend() -> str:
 
 
 def _context(width: int, height: int) -> Any:
-    """An OpenGL context of this size, the current one."""
+    """A new OpenGL context, made current."""
     name = _backend()
     if name not in BACKENDS:
-        raise GraphicsError(f"MUJOCO_GL = {name!r}: must be one of {', '.join(BACKENDS)} to draw with")
+        raise GraphicsError(f"MUJOCO_GL = {name!r}: must be one of {', '.join(BACKENDS)} to render")
     try:
-        with warnings.catch_warnings(action="ignore"):  # GLFW's: the error says it
+        with warnings.catch_warnings(action="ignore"):  # GLFW warns before it fails
             context = import_module(f"mujoco.{name}").GLContext(width, height)
             context.make_current()
-    except Exception as error:  # whatever PyOpenGL, GLFW and the drivers raise where something is missing
+    except Exception as error:  # PyOpenGL, GLFW and drivers raise all kinds where something is missing
         raise _error(error) from error
     return context
 
 
 def _error(error: Exception) -> GraphicsError:
     why = f"{type(error).__name__}: {' '.join(str(error).split())[:120]}"
-    return GraphicsError(f"there is no OpenGL to draw with through {_backend()} ({why}); {HELP}")
+    return GraphicsError(f"OpenGL is not available through {_backend()} ({why}); {HELP}")

@@ -1,4 +1,4 @@
-"""Pictures in files: one as .png, moving ones as .gif or .mp4."""
+"""Writing pictures to files: a single one as .png, an animation as .gif or .mp4."""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 Picture = NDArray[np.uint8]
-TICK = Fraction(1, 100)  # in which a .gif counts [s]
-SAMPLES = 8  # frames that the colours of a .gif are taken from
-QUALITY = "18"  # of a .mp4: the constant rate factor of H.264, at which differences can hardly be seen
+TICK = Fraction(1, 100)  # unit of time of a .gif [s]
+SAMPLES = 8  # frames from which the palette of a .gif is chosen
+QUALITY = "18"  # constant rate factor of H.264, at which compression is hardly visible
 
 
 def write_png(picture: Picture, path: Path) -> None:
@@ -21,22 +21,22 @@ def write_png(picture: Picture, path: Path) -> None:
 
 
 def write_gif(frames: Sequence[Picture], fps: int, path: Path) -> None:
-    """Write frames (H, W, 3) that are repeated for ever, in 256 colours that all of them share.
+    """Write frames (H, W, 3) as an endless loop with one palette of 256 colours for all of them.
 
-    A frame is shown up to the hundredth of a second that is nearest to where it ends, so that none adds to another's
-    error.
+    Each frame ends at the hundredth of a second nearest to its exact end, so rounding errors do not add up.
     """
     some = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, SAMPLES).astype(int))]
     palette = Image.fromarray(np.concatenate(some)).quantize(dither=Image.Dither.NONE)
     pictures = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     ends = [round(k / (fps * TICK)) for k in range(len(frames) + 1)]
     milliseconds = [10 * (end - start) for start, end in pairwise(ends)]
-    first = next(pictures)
-    first.save(path, format="GIF", save_all=True, append_images=pictures, duration=milliseconds, loop=0, optimize=False)
+    first, moving = next(pictures), {"save_all": True, "duration": milliseconds, "loop": 0, "optimize": False}
+    with path.open("wb") as file:  # which Pillow would leave open when it is interrupted
+        first.save(file, format="GIF", append_images=pictures, **moving)
 
 
 def write_mp4(frames: Sequence[Picture], fps: int, path: Path) -> None:
-    """Write frames (H, W, 3), H and W even, as H.264; it needs the package av."""
+    """Write frames (H, W, 3), with H and W even, as H.264 video; this needs the package av."""
     import av
 
     with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as file:

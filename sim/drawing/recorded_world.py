@@ -1,4 +1,4 @@
-"""One world of a run as it is sent to a rerun recording: how much of it, in columns, and the wrench space over time."""
+"""One world of a run and the rerun recording that it is sent to in columns; its wrench space over time."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,7 +17,7 @@ HUGE = 1e30  # beyond it single precision, which views are kept in, ends
 
 @dataclass(frozen=True, eq=False)
 class Film(DrawnWorld):
-    """A world as it is drawn, and the recording it is sent to."""
+    """One world of a run, and the recording that it is sent to."""
 
     rr: Any  # the module
     stream: Any

@@ -1,4 +1,4 @@
-"""Geoms that are added to a MuJoCo scene: arrows, lines, boxes and surfaces, which throw no shadow."""
+"""Adding geoms to a MuJoCo scene: arrows, lines, boxes and surfaces."""
 
 from collections.abc import Iterable
 from itertools import pairwise
@@ -12,31 +12,31 @@ Array = NDArray[np.float64]
 BOX, CAPSULE, LINE, ARROW, TRIANGLE = (
     getattr(mujoco.mjtGeom, f"mjGEOM_{kind}").value for kind in ("BOX", "CAPSULE", "LINE", "ARROW", "TRIANGLE")
 )
-GLOW = 0.35  # of what is no thing, so that it has its colour from all sides
-LENGTH = 2.0  # of an arrow, as MuJoCo counts it, by that with which it is drawn
+GLOW = 0.35  # emission, so that colours can be told apart in shade as well
+LENGTH = 2.0  # MuJoCo's renderer draws an arrow half as long as the connector that it is made from
 
 
 def add_arrow(scene: mujoco.MjvScene, at: Array, vector: Array, colour: Colour, radius: float) -> None:
-    """Add an arrow from a point (3,) to `at` + `vector` (3,), unless that is not finite or shorter than its radius."""
+    """Add an arrow from `at` (3,) to `at + vector`, unless it is not finite or shorter than its radius [m]."""
     if np.isfinite(vector).all() and np.linalg.norm(vector) > radius:
         _connect(scene, ARROW, at, at + LENGTH * vector, colour, radius)
 
 
 def add_path(scene: mujoco.MjvScene, points: Array, colour: Colour, radius: float = 0.0) -> None:
-    """Add a line through points (P, 3) of this radius [m], or as thin as it can be seen."""
+    """Add a line through points (P, 3), as a tube of this radius [m] or else as a thin line."""
     for start, end in pairwise(points):
         _connect(scene, CAPSULE if radius else LINE, start, end, colour, radius or 1.5)
 
 
 def add_box(scene: mujoco.MjvScene, middle: Array, axes: Array, half: Array, colour: Colour) -> None:
-    """Add a box of half sizes `half` (3,) along the columns of `axes` (3, 3), which is lit as things are."""
+    """Add a box with half sizes `half` (3,) along the columns of `axes` (3, 3)."""
     _add(scene, BOX, colour, half, middle, axes)
 
 
 def add_surface(
     scene: mujoco.MjvScene, vertices: Array, triangles: Iterable[ArrayLike], colour: Colour, opacity: int
 ) -> None:
-    """Add triangles, each of three rows of `vertices` (V, 3), seen from both sides."""
+    """Add triangles, each given by three rows of `vertices` (V, 3); both of their sides are visible."""
     for triangle in triangles:
         corner, *others = vertices[np.asarray(triangle)]
         first, second = (other - corner for other in others)

@@ -1,6 +1,6 @@
-"""A finished run as a picture or a moving picture of its scene, by MuJoCo's own renderer.
+"""A finished run as a picture or a video of its scene, drawn by MuJoCo's own renderer.
 
-Nothing is solved or simulated again: every frame shows the arrays of the `Run` at the step that begins then.
+Nothing is solved or simulated again: each frame shows the arrays of the `Run` at the step that begins at that time.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pivoting.controller.validate import fail, number
 from pivoting.sim.drawing.caption import Caption, caption
 from pivoting.sim.drawing.colours import DARK
-from pivoting.sim.drawing.drawn_world import DrawnWorld
+from pivoting.sim.drawing.drawn_world import FAR, DrawnWorld
 from pivoting.sim.drawing.mujoco_scene import LEGEND, MujocoScene
 from pivoting.sim.drawing.offscreen import OffScreen
 from pivoting.sim.drawing.picture_files import write_gif, write_mp4, write_png
@@ -24,24 +24,25 @@ from pivoting.sim.whole_files import whole
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 FPS = 25
-FASTEST = {".gif": 50, ".mp4": 120}  # frames a second: viewers show a .gif with more of them ten times as slowly
-PIXELS = 240, 4096  # that a side may have
-FRAMES = 20_000  # at most: the rest of a day
+FASTEST = {".gif": 50, ".mp4": 120}  # frames a second at most; browsers slow a .gif with more down to 10
+PIXELS = 240, 4096  # smallest and largest side of a picture
+FRAMES = 20_000  # at most
+HELD = 1_000_000_000  # pixels of all frames of a .gif at most; they are held in memory, a byte each
 
 
 @dataclass(frozen=True)
 class Output:
-    """What is made of a run.
+    """The file to write and what it shows.
 
     Attributes:
         path: of the file, in a folder that exists: .gif or .mp4, or .png for one picture.
         size: width and height in pixels.
-        fps: frames a second of a moving picture; None: 25.
-        speed: of it, 1 in real time, 0.5 half as fast; None: 1.
-        time: of one picture, from the start of the run [s]; None: the middle of the run.
+        fps: frames a second of a video; None: 25.
+        speed: of a video, 1 is real time and 0.5 half as fast; None: 1.
+        time: that a single picture shows, from the start of the run [s]; None: the middle of the run.
 
     Raises:
-        InputError: one of them cannot be had, for a reason that is given.
+        InputError: one of them is not allowed, or the package for .mp4 files is missing.
     """
 
     path: Path
@@ -51,7 +52,7 @@ class Output:
     time: float | None = None
 
     def __post_init__(self) -> None:
-        """Check all that can be checked without a run."""
+        """Check everything that can be checked before the run."""
         kind, name = self.path.suffix, str(self.path)
         if kind not in (*FASTEST, ".png"):
             raise fail("out", name, "a .gif, .mp4 or .png file")
@@ -77,10 +78,10 @@ class Output:
             number("speed", self.speed, above=0.0)
 
     def times(self, duration: float) -> Array:
-        """(F,) when in a run of this duration its frames are [s]; all of them together last as long, by the speed.
+        """(F,) the simulated times [s] that the frames for a run of this duration [s] show.
 
         Raises:
-            InputError: that is beyond the end, or takes too many of them.
+            InputError: the time of the picture is after the end, or there are too many frames.
         """
         if self.path.suffix == ".png":
             time = 0.5 * duration if self.time is None else number("time", self.time, at_least=0.0, at_most=duration)
@@ -88,39 +89,41 @@ class Output:
         fps, speed = self.rate
         count = max(1, round(fps * duration / speed))
         if count > FRAMES:
-            raise fail(
-                "speed", speed, f"at least {1.05 * fps * duration / FRAMES:.2g}: of {FRAMES} frames, more are not made"
-            )
+            raise fail("speed", speed, f"at least {1.05 * fps * duration / FRAMES:.2g}, for {FRAMES} frames at most")
+        if self.path.suffix == ".gif" and count * self.size[0] * self.size[1] > HELD:
+            raise fail("out", str(self.path), f"a .mp4 file: {count} frames of this size are too many for a .gif file")
         return np.arange(count) * speed / fps
 
     @property
     def rate(self) -> tuple[int, float]:
-        """Frames a second, and the speed."""
+        """Frames a second and speed of a video."""
         return self.fps or FPS, self.speed or 1.0
 
 
 def render(
     run: Run, output: Output, *, world: int | None = None, progress: Callable[[int, int], None] | None = None
 ) -> int:
-    """Write one world of a finished run as a picture or a moving picture; the number of its frames.
+    """Write a picture or a video of one world of a finished run; return the number of frames.
 
-    A world that diverges is shown up to there.
+    A world that diverges is shown up to where it does.
 
     Args:
         run: of `simulate`.
-        output: the file, which appears, or is replaced, when it is whole.
+        output: the file, which is written whole or not at all.
         world: which one; None: the worst, see `Run.worst_world`.
         progress: called with (frames done, frames).
 
     Raises:
-        InputError: there is no such world, or nothing of it at that time.
-        GraphicsError: this machine has no OpenGL to draw with.
+        InputError: there is no such world, or the output cannot be made of a run of this duration.
+        GraphicsError: OpenGL is missing.
         OSError: the file cannot be written.
     """
     world = run.worst_world if world is None else world
     if isinstance(world, bool) or not isinstance(world, int | np.integer) or not 0 <= world < run.worlds:
         raise fail("world", world, f"a whole number in [0, {run.worlds})")
     film = DrawnWorld(run, int(world))
+    if not film.answers:
+        raise fail("world", world, f"one that begins within {FAR:g} m of the origin")
     times = output.times(float(run.time[film.answers]))
     width, height = output.size
     words = caption(LEGEND[film.dim], _when(film, film.answers - 1, output), width, height)
@@ -137,7 +140,7 @@ def render(
 
 @dataclass(frozen=True, eq=False)
 class _Frames(Sequence[Picture]):
-    """Pictures (height, width, 3), made when they are asked for."""
+    """The frames (height, width, 3), each rendered when it is indexed."""
 
     film: DrawnWorld
     scene: MujocoScene
@@ -161,7 +164,7 @@ class _Frames(Sequence[Picture]):
 
 
 def _when(film: DrawnWorld, row: int, output: Output) -> str:
-    """Time and angle at the beginning of step `row`, and the speed, if it is not real time."""
+    """Time and angle at the beginning of step `row`, and the speed unless it is real time."""
     run, speed = film.run, output.rate[1]
     digits = max(0, 2 - floor(log10(run.time[-1])))
     time, angle = run.time[row], np.rad2deg(run.theta[film.world, row])

@@ -86,9 +86,11 @@ def arcs(sweep: Array, radius: float) -> Array:
 
 
 def shadow(points: Array, surface: Surface) -> Array:
-    """(P, 2) the outline of what points (N, 3) cover of a face that they are over, counter-clockwise; it may be empty.
+    """(P, 2) outline, counter-clockwise, of the shadow that a convex body casts straight down on a face; may be empty.
 
-    All of it along the face (t, o), from its middle [m].
+    Args:
+        points: (N, 3) whose convex hull is the body, world axes [m].
+        surface: the face; the outline is in its axes (t, o), from its middle [m].
     """
     flat = (points - surface.origin) @ surface.axes[:, :2]
     outline = flat[ConvexHull(flat).vertices]
@@ -103,7 +105,7 @@ def shadow(points: Array, surface: Surface) -> Array:
 
 
 def _cut(outline: Array, beyond: Array) -> Array:
-    """A convex outline (P, 2) without what is beyond a line, by (P,)."""
+    """A convex outline (P, 2) cut off along a line, of which its points are `beyond` (P,) by a signed distance."""
     kept = []
     for k, (point, over) in enumerate(zip(outline, beyond, strict=True)):
         before = beyond[k - 1]
