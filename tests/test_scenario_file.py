@@ -48,7 +48,7 @@ def test_what_is_written_is_read_again(case: Scenario, tmp_path: Path) -> None:
     "case",
     [
         SCENARIOS["pivot-2d"].change(reference=Constant(0.5)),
-        SCENARIOS["pivot-2d"].change(theta=np.float32(11.3)),  # of which text keeps another value
+        SCENARIOS["pivot-2d"].change(theta=np.float32(11.5)),  # with which NumPy computes in single precision
         replace(SCENARIOS["incline-2d"], world={}),  # which no key says
     ],
     ids=["reference", "float32", "world"],
