@@ -39,7 +39,7 @@ def write_netcdf(path: Path, variables: Mapping[str, Variable], texts: Mapping[s
         if variable.values.nbytes > MOST:
             size = f"{variable.values.nbytes:,} bytes, more than the {MOST:,} that NetCDF 3 allows"
             raise InputError(f"run: its {name} would take {size}; must have fewer worlds or steps")
-    with netcdf_file(path, "w", version=2) as file:
+    with path.open("wb") as opened, netcdf_file(opened, "w", version=2) as file:
         for name, text in texts.items():
             setattr(file, name, text.encode())
         for name, variable in variables.items():
@@ -67,7 +67,7 @@ def _add(file: Any, name: str, variable: Variable) -> None:
 
 def read_netcdf(path: Path, *texts: str) -> tuple[dict[str, NDArray[Any]], tuple[str, ...]]:
     """The arrays of a file that `write_netcdf` wrote, and these texts of it."""
-    with netcdf_file(path, "r", mmap=False) as file:
+    with path.open("rb") as opened, netcdf_file(opened, "r", mmap=False) as file:
         arrays = {name: _native(variable) for name, variable in file.variables.items()}
         return arrays, tuple(getattr(file, name).decode() for name in texts)
 

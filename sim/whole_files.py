@@ -24,10 +24,10 @@ def write_together(folder: Path, writers: Mapping[str, Writer]) -> None:
         OSError: a file cannot be written.
     """
     made = [path for path in (folder, *folder.parents) if not path.exists()]
-    folder.mkdir(parents=True, exist_ok=True)
     parts = {folder / name: folder / f".{name}.{os.getpid()}.part" for name in writers}
     done = False
     try:
+        folder.mkdir(parents=True, exist_ok=True)
         for part, write in zip(parts.values(), writers.values(), strict=True):
             write(part)
         for target in parts:
@@ -39,7 +39,8 @@ def write_together(folder: Path, writers: Mapping[str, Writer]) -> None:
             done = True
     finally:
         for part in parts.values():
-            part.unlink(missing_ok=True)
+            with suppress(FileNotFoundError, NotADirectoryError):  # it has moved, or there never was one
+                part.unlink()
         if not done:
             for path in made:
                 with suppress(OSError):  # somebody else has put something there

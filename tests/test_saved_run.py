@@ -171,7 +171,8 @@ def test_a_file_that_was_cut_is_refused(name: str, share: float, kept: tuple[Run
     file = copied(kept, tmp_path) / name
     whole = file.read_bytes()
     file.write_bytes(whole[: min(int(share * len(whole)), len(whole) - 2)])
-    with pytest.raises(ValueError, match=re.escape(str(file))):
+    told = rf"{re.escape(str(file))}: {'was cut' if name == 'run.nc' else 'must be a scenario in JSON, whole'}"
+    with pytest.raises(ValueError, match=told):
         load(tmp_path)
 
 
