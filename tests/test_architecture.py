@@ -1,6 +1,8 @@
 """The rooms: who may import whom, how long a file may be, and that what is declared is what is used."""
 
 import ast
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -27,7 +29,8 @@ def imported(path: Path) -> set[str]:
 def test_rooms_import_only_what_they_may(path: Path) -> None:
     room = path.relative_to(ROOT).parts[0]
     own = {name.split(".")[1] for name in imported(path) if name.startswith("pivoting.")} - {"__main__"}
-    assert own <= ROOMS.get(room, set(ROOMS))
+    # The base of all errors belongs to no room: one `except` must catch those of all three, which share nothing else.
+    assert own - {"errors"} <= ROOMS.get(room, set(ROOMS))
     if room == "controller":
         assert not {name for name in imported(path) if name.split(".")[0] in ("mujoco", "rerun")}
     assert not {name.split(".")[0] for name in imported(path)} & set(ROOMS), "bare room names"
@@ -61,8 +64,6 @@ def test_what_is_imported_is_declared() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     declared = {line.split(">")[0].split("=")[0].split("<")[0].strip() for line in project["dependencies"]}
     packages = {"rerun": "rerun-sdk", "mpl_toolkits": "matplotlib"}
-    import sys
-
     for path in FILES:
         for name in imported(path):
             top = name.split(".")[0]
@@ -70,10 +71,37 @@ def test_what_is_imported_is_declared() -> None:
                 assert packages.get(top, top) in declared, f"{path}: {top}"
 
 
-def test_importing_the_mathematics_does_not_import_the_simulator() -> None:
-    import subprocess
-    import sys
-
-    code = "import sys, pivoting.controller; print([m for m in ('mujoco', 'rerun', 'matplotlib') if m in sys.modules])"
+@pytest.mark.parametrize(
+    ("module", "others"),
+    [
+        ("pivoting.controller", ("mujoco", "rerun", "matplotlib")),
+        ("pivoting.errors", ("numpy", "numba", "mujoco", "pivoting.controller", "pivoting.models", "pivoting.sim")),
+    ],
+)
+def test_what_an_import_does_not_bring_along(module: str, others: tuple[str, ...]) -> None:
+    """The mathematics leave out the simulator, the base of all errors everything."""
+    code = f"import sys, {module}; print([name for name in {others} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_one_base_catches_every_error() -> None:
+    """Those that are raised by others, ValueError and its like, stay what they are as well."""
+    errors = {
+        node.name: {ast.unparse(base) for base in node.bases}
+        for path in FILES
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.ClassDef) and node.name.endswith("Error") and node.name != "PivotingError"
+    }
+    assert {"SolveError", "PlanError", "InputError", "ModelError", "ControlError"} <= set(errors)
+    for name, bases in errors.items():
+        assert "PivotingError" in bases, name
+        assert bases & {"RuntimeError", "ValueError"}, name
+
+
+CALLS = {"clarabel": "clarabel_backend.py", "qpsolvers": "qpsolvers_backend.py", "piqp": "qpsolvers_backend.py"}
+
+
+def test_each_solver_is_called_in_one_place() -> None:
+    for solver, name in CALLS.items():
+        assert [path.name for path in FILES if solver in imported(path)] == [name]

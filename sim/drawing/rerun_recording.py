@@ -26,6 +26,7 @@ import numpy as np
 from pivoting.controller.solution import STATUS
 from pivoting.controller.solution_space import SolutionSpace
 from pivoting.controller.validate import fail
+from pivoting.errors import PivotingError
 from pivoting.sim.drawing.recorded_world import PLOTS, SCENE, UP, Array, Colour, Film, Rows, usual, xyzw
 from pivoting.sim.drawing.recording_id import digest
 from pivoting.sim.drawing.shapes import arcs, cone
@@ -66,7 +67,7 @@ COMPONENTS = {  # of w by dimension
 }
 
 
-class RecordingOffError(RuntimeError):
+class RecordingOffError(PivotingError, RuntimeError):
     """The environment says that nothing is to be recorded."""
 
 

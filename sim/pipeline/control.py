@@ -5,12 +5,13 @@ from typing import NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.bounded_solver import BoundedSolver
-from pivoting.controller.conic_program import USABLE
+from pivoting.controller.errors import PlanError
 from pivoting.controller.orientation_references import Turn
 from pivoting.controller.planning.horizon import BodyState
 from pivoting.controller.planning.receding_horizon import OUTCOMES, Followed, RecedingHorizon, followed_motion
-from pivoting.controller.planning.sequential_convex import Plan, PlanError, Planner
+from pivoting.controller.planning.sequential_convex import Plan, Planner
 from pivoting.controller.solution import STATUS
+from pivoting.controller.solvers.conic_program import USABLE
 from pivoting.controller.wrench_bounds import WrenchBounds, fill_excess
 from pivoting.controller.wrench_controller import WrenchController, step_worlds
 
