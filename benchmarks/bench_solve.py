@@ -17,10 +17,12 @@ import mujoco
 import numpy as np
 from harness import main, peer_table, timed
 from pivoting.controller import ClarabelWorkspace, WrenchProblem, methods, pyramid_excess, solve
-from pivoting.controller.conic import CLARABEL, ConicForm, conic_form
 from pivoting.controller.kernels.interior_point import contact_wrench
 from pivoting.controller.kernels.planar_closed_form import planar_wrench
 from pivoting.controller.kernels.workspace import workspace
+from pivoting.controller.solvers.clarabel_backend import SETTINGS
+from pivoting.controller.solvers.conic_program import Cones
+from pivoting.controller.solvers.wrench_program import wrench_program
 from pivoting.controller.validate import Array
 from rich import print as show
 from rich.markdown import Markdown
@@ -35,11 +37,12 @@ LOOP, KERNEL, PUBLIC = "ours, compiled loop", "ours, compiled entry from Python"
 IN_PLACE, PYRAMID = "Clarabel in place", 'solve(problem, "qp:daqp"), 8-edge pyramid'
 BACKENDS = ("daqp", "quadprog", "piqp", "proxqp", "clarabel", "cvxopt", "ecos", "highs", "osqp", "scs")
 COLUMNS = {"us": "#.3g", "times ours": "#.3g", "error, median": ".0e", "error, max": ".0e", "failures": ".0f"}
+TIGHT = SETTINGS["wrench"]
 REPEATS, LOOSE = 3, {"tol_gap_abs": 1e-8, "tol_gap_rel": 1e-8, "tol_feas": 1e-8}
 
 
 class Instance(NamedTuple):
-    """min 1/2 x'P x  s.t.  A x = b,  d - C x in half-lines, then cones;  x = (f, w) / unit; see `ConicForm`."""
+    """min 1/2 x'P x  s.t.  A x = b,  d - C x in half-lines, then cones;  x = (f, w) / unit; see `WrenchProgram`."""
 
     data: Data
     problem: WrenchProblem
@@ -50,7 +53,8 @@ class Instance(NamedTuple):
     d: Array
     upper: csc_matrix  # of P; it and `rows`, A and C, have the pattern that all problems of one shape share
     rows: csc_matrix
-    form: ConicForm
+    cones: Cones
+    unit: float
 
 
 # What is prepared outside the clock, and the timed call, which gives the forces f [N], or x, or None.
@@ -59,11 +63,12 @@ Route = tuple[Callable[[Instance], tuple[Any, ...]], Callable[..., Any]]
 
 def instance(data: Data) -> Instance:
     """`data` in every form."""
-    form = conic_form(problem := stated(data))
-    upper, rows = (csc_matrix(pattern.astype(float)) for pattern in form.pattern)
-    upper.data, rows.data = form.P.T[form.pattern[0].T], form.A.T[form.pattern[1].T]
-    (A, C), (b, d) = (np.split(whole, [form.balance]) for whole in (form.A, form.b))
-    return Instance(data, problem, form.P + np.triu(form.P, 1).T, A, b, C, d, upper, rows, form)
+    problem = stated(data)
+    program, unit = wrench_program(problem.contacts, problem.dim).stated(problem)
+    (A, C), (b, d) = (np.split(whole, [program.cones.zero]) for whole in (program.A.dense(), program.b))
+    upper, rows = program.P.csc(), program.A.csc()
+    P = program.P.dense(mirrored=True)
+    return Instance(data, problem, P, A, b, C, d, upper, rows, program.cones, unit)
 
 
 def kernel(first: Instance) -> Route:
@@ -98,7 +103,7 @@ def clarabel_public(first: Instance) -> Route:
 
 def clarabel_in_place(first: Instance, **options: float) -> Route:
     """Nothing but Clarabel's own update and solve, as `ClarabelWorkspace` has set it up."""
-    solver = ClarabelWorkspace(first.problem, **options)._solver
+    solver = ClarabelWorkspace(first.problem, **options)._clarabel._solver
 
     def run(P: Array, A: Array, b: Array) -> Any:
         solver.update(P=P.tolist(), A=A.tolist(), b=b.tolist())  # of arrays it takes longer than all of this
@@ -133,10 +138,10 @@ def quadprog(first: Instance) -> Route:
 def qoco(first: Instance) -> Route:
     import qoco
 
-    n, nw, m, cones = len(first.P), len(first.b), len(first.d), (len(first.d) - first.form.linear) // 3
+    n, nw, m, cones = len(first.P), len(first.b), len(first.d), (len(first.d) - first.cones.linear) // 3
     solver, tight = qoco.QOCO(), {"abstol": 1e-9, "reltol": 1e-9, "verbose": 0}  # below it calls many inaccurate
     parts = first.upper, np.zeros(n), first.rows[:nw], first.b, first.rows[nw:], first.d
-    solver.setup(n, m, nw, *parts, first.form.linear, cones, [3] * cones or None, **tight)
+    solver.setup(n, m, nw, *parts, first.cones.linear, cones, [3] * cones or None, **tight)
 
     def run(P: Array, A: Array, b: Array, G: Array, h: Array) -> Any:
         solver.update_matrix_data(P=P, A=A, G=G)
@@ -152,14 +157,14 @@ def cvxpy(first: Instance) -> Route:
 
     x, root = cp.Variable(len(first.P)), cp.Parameter(first.P.shape)
     A, b, C, d = (cp.Parameter(values.shape) for values in (first.A, first.b, first.C, first.d))
-    linear, s = first.form.linear, d - C @ x
+    linear, s = first.cones.linear, d - C @ x
     cones = [cp.SOC(s[i], s[i + 1 : i + 3]) for i in range(linear, len(first.d), 3)]
     program = cp.Problem(cp.Minimize(0.5 * cp.sum_squares(root @ x)), [A @ x == b, s[:linear] >= 0.0, *cones])
 
     def run(*values: Array) -> Any:
         for parameter, value in zip((root, A, b, C, d), values, strict=True):
             parameter.value = value
-        program.solve(solver="CLARABEL", **CLARABEL)
+        program.solve(solver="CLARABEL", **TIGHT)
         return x.value if program.status == "optimal" else None
 
     return lambda it: (np.linalg.cholesky(it.P).T, it.A, it.b, it.C, it.d), run
@@ -182,11 +187,11 @@ def drake(first: Instance) -> Route:
     from pydrake.solvers import ClarabelSolver, MathematicalProgram, SolverOptions
 
     solver, options = ClarabelSolver(), SolverOptions()
-    for name, value in CLARABEL.items():
+    for name, value in TIGHT.items():
         options.SetOption(solver.solver_id(), name, value)
 
     def prepare(it: Instance) -> tuple[Any, ...]:
-        program, linear = MathematicalProgram(), it.form.linear
+        program, linear = MathematicalProgram(), it.cones.linear
         x = program.NewContinuousVariables(len(it.P))
         program.AddQuadraticCost(it.P, np.zeros(len(it.P)), x, is_convex=True)
         program.AddLinearEqualityConstraint(it.A, it.b, x)
@@ -241,7 +246,7 @@ def family(name: str, count: int) -> dict[str, float]:
             spent[peer][i] = 1e6 * seconds
             if answer is not None and np.isfinite(answer).all():
                 answer = np.ravel(answer)
-                f = answer[: K * dim] * (it.form.unit if answer.size == len(it.P) else 1.0)
+                f = answer[: K * dim] * (it.unit if answer.size == len(it.P) else 1.0)
                 errors[peer][i] = np.linalg.norm(f - best.force[i]) / load
     out = {f"{name}: ours, greatest KKT residual": best.residual.max(), f"{name}: {LOOP}, us": np.median(loop)}
     out[f"{name}: {LOOP}, times ours"] = np.median(loop) / spent[KERNEL].mean()

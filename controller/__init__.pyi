@@ -1,10 +1,10 @@
-from .conic import ClarabelWorkspace as ClarabelWorkspace
+from .solvers.clarabel_workspace import ClarabelWorkspace as ClarabelWorkspace
 from .contacts import Contact as Contact
 from .control_laws import Body as Body, Law as Law
 from .motion import Motion as Motion
 from .planning.horizon import BodyState as BodyState, Horizon as Horizon
 from .planning.receding_horizon import RecedingHorizon as RecedingHorizon
-from .planning.sequential_convex import Plan as Plan, PlanError as PlanError, Planner as Planner
+from .planning.sequential_convex import Plan as Plan, Planner as Planner
 from .references import (
     Constant as Constant,
     MinimumJerk as MinimumJerk,
@@ -12,8 +12,9 @@ from .references import (
     Sampled as Sampled,
     Sine as Sine,
 )
-from .solution import Solution as Solution, SolveError as SolveError
-from .solvers import methods as methods, pyramid_excess as pyramid_excess, solve as solve
+from .errors import PlanError as PlanError, SolveError as SolveError
+from .solution import Solution as Solution
+from .solvers.solve import methods as methods, pyramid_excess as pyramid_excess, solve as solve
 from .wrench_bounds import WrenchBounds as WrenchBounds
 from .wrench_controller import WrenchController as WrenchController
 from .wrench_problem import WrenchProblem as WrenchProblem, wrench_weight as wrench_weight

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from pivoting.controller.cone_constraints import friction_limits, wrench_limits
-from pivoting.controller.conic_program import ClarabelInPlace, Cones, ConicProgram
 from pivoting.controller.kernels.compilation import kernel
 from pivoting.controller.mobility import free_axes
 from pivoting.controller.plane_and_space import component
-from pivoting.controller.planning.block_matrix import BlockMatrix, Indices, Part
 from pivoting.controller.rotations import cross, fill_rotation, into
+from pivoting.controller.solvers.block_matrix import BlockMatrix, Indices, Part
+from pivoting.controller.solvers.clarabel_backend import ClarabelWithRetry
+from pivoting.controller.solvers.conic_program import Cones, ConicProgram
 from pivoting.controller.validate import Array, number
 from pivoting.controller.wrench_bounds import WrenchBounds
 from pivoting.controller.wrench_controller import WrenchController
@@ -99,7 +100,7 @@ class BoundedSolver:
         self._P = BlockMatrix((wide, wide), [Part(every, every, P != 0.0, P)]).filled(())
         self._q = np.zeros(wide)
         self._q[t_a], self._q[t_s] = GIVE_UP, BREAK
-        self._solve = ClarabelInPlace(step=0.999)  # 14 iterations in place of 20
+        self._solve = ClarabelWithRetry(step=0.999)  # 14 iterations in place of 20
 
     def __call__(self, orientation: Array, required: Array, before: Array | None = None) -> BoundedWrench:
         """The answer to a problem of the controller.

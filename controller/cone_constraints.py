@@ -12,7 +12,7 @@ Flags = NDArray[np.bool_]
 UNBOUNDED = 1e3  # of the weight: in place of a bound on the change from a wrench that is not known
 
 
-class Limits(NamedTuple):
+class ConeConstraints(NamedTuple):
     """side - rows x in half-lines (`linear`) and in second-order cones of `orders` (`cone`).
 
     x is a wrench or a set of contact forces; where `rate`, it is what that differs by from the one before. `rated`:
@@ -47,27 +47,36 @@ class Limits(NamedTuple):
                 sides[begin : begin + len(side)] = side + rate * (rows @ before)
 
 
-def friction_limits(mu: Array, floors: Array, dim: int) -> Limits:
-    """The truncated friction cones of K contacts on forces (K d,): |f_t| <= mu f_n, f_n >= floor."""
-    K = len(mu)
-    linear, side, cone = [], [], []
-    for i, (friction, floor) in enumerate(zip(mu, floors, strict=True)):
-        tangents, normal = np.eye(K * dim)[dim * i : dim * (i + 1) - 1], np.eye(K * dim)[dim * (i + 1) - 1]
-        linear.append(-normal)
-        side.append(-floor)
-        if dim == 2:
-            linear += [tangents[0] - friction * normal, -tangents[0] - friction * normal]
-            side += [0.0, 0.0]
-        else:
-            cone += [-friction * normal, *-tangents]
-    rows = np.reshape(cone, (-1, K * dim))
-    still = np.zeros(len(linear), dtype=bool), np.zeros(len(rows), dtype=bool)
-    return Limits(
-        np.array(linear), np.array(side), still[0], rows, np.zeros(len(rows)), still[1], (3,) * (len(rows) // 3), False
-    )
+def friction_limits(mu: Array, floors: Array, dim: int, edges: int = 0) -> ConeConstraints:
+    """The truncated friction cones of K contacts on forces (K d,): |f_t| <= mu f_n, f_n >= floor.
+
+    Half-lines hold each contact's floor and then the linear sides of its cone: both of them in the plane, in space the
+    faces of the inscribed pyramid of so many `edges`; without edges, the cones of space are second-order cones.
+    """
+    K, second_order = len(mu), dim == 3 and not edges
+    faces = np.zeros((0, 2))
+    if dim == 2:
+        faces = np.array([[1.0], [-1.0]])
+    elif edges:
+        faces = polygon(edges).facets
+    tall = 1 + len(faces)  # half-lines of a contact
+    linear, side = np.zeros((K * tall, K * dim)), np.zeros(K * tall)
+    cone = np.zeros((K * dim * second_order, K * dim))
+    side[::tall] = -floors
+    for i, friction in enumerate(mu.tolist()):
+        floor, normal = tall * i, dim * (i + 1) - 1
+        linear[floor, normal] = -1.0
+        linear[floor + 1 : floor + tall, dim * i : normal] = faces
+        linear[floor + 1 : floor + tall, normal] = -friction
+        if second_order:
+            cone[dim * i, normal] = -friction
+            cone[dim * i + 1, normal - 2] = cone[dim * i + 2, normal - 1] = -1.0
+    still = np.zeros(len(linear), dtype=bool), np.zeros(len(cone), dtype=bool)
+    orders = (dim,) * K if second_order else ()
+    return ConeConstraints(linear, side, still[0], cone, np.zeros(len(cone)), still[1], orders, False)
 
 
-def wrench_limits(bounds: WrenchBounds, nw: int, edges: int, unit: Array, h: float) -> Limits:
+def wrench_limits(bounds: WrenchBounds, nw: int, edges: int, unit: Array, h: float) -> ConeConstraints:
     """Bounds on wrenches (nw,) in units (nw,), and on their change over a step of `h` [s].
 
     With `edges`, two components are kept in the inscribed polygon of so many edges; with 0 in their disc.
@@ -92,7 +101,7 @@ def wrench_limits(bounds: WrenchBounds, nw: int, edges: int, unit: Array, h: flo
             sides[1].extend([radius] + [0.0] * len(rows))
             rates[1].extend([ball.rate] * (len(rows) + 1))
             orders.append(len(rows) + 1)
-    return Limits(
+    return ConeConstraints(
         np.reshape(linear, (-1, nw)), np.array(sides[0]), np.array(rates[0], dtype=bool),
         np.reshape(cone, (-1, nw)), np.array(sides[1]), np.array(rates[1], dtype=bool), tuple(orders),
         bounds.rated,

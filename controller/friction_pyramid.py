@@ -19,9 +19,19 @@ def polygon(edges: int) -> Polygon:
     Raises:
         ValueError: fewer than 3 edges, or not a whole number.
     """
-    if not isinstance(edges, (int, np.integer)) or isinstance(edges, bool) or edges < 3:
-        raise fail("edges", edges, "a whole number >= 3")
+    check_edges(edges)
     angle = 2.0 * np.pi / edges * np.arange(edges)
     vertices = np.column_stack([np.cos(angle), np.sin(angle)])
     sums = vertices + np.roll(vertices, -1, axis=0)
     return Polygon(vertices, sums / np.sum(sums * vertices, axis=1, keepdims=True))
+
+
+def check_edges(edges: object) -> int:
+    """`edges`, if a polygon may have so many.
+
+    Raises:
+        ValueError: fewer than 3, or not a whole number.
+    """
+    if not isinstance(edges, int | np.integer) or isinstance(edges, bool) or edges < 3:
+        raise fail("edges", edges, "a whole number >= 3")
+    return int(edges)

@@ -1,8 +1,9 @@
-"""An answer with its certificate, and the error that carries a refused one."""
+"""The answer to a wrench problem, with its certificate."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
+from pivoting.controller.errors import SolveError
 from pivoting.controller.validate import Array
 from pivoting.controller.wrench_problem import WrenchProblem
 
@@ -45,23 +46,11 @@ class Solution:
         return self.problem.objective(self.wrench, self.force)
 
 
-class SolveError(RuntimeError):
-    """No answer within tolerance. Carries the `problem` and the refused `solution` (with status and residual)."""
-
-    def __init__(self, solution: Solution, tolerance: float, said: str):
-        self.problem = solution.problem
-        self.solution = solution
-        super().__init__(
-            f"{solution.method}: {solution.status}, KKT residual {solution.residual:.3g} above tolerance "
-            f"{tolerance:g}; the solver said: {said}"
-        )
-
-
 def certified(
     problem: WrenchProblem,
     wrench: Array,
     force: Array,
-    said: str,
+    message: str,
     *,
     method: str,
     seconds: float,
@@ -69,6 +58,9 @@ def certified(
     edges: int = 0,
 ) -> Solution:
     """The answer of a solver, wrench (nw,) and force (K d,), as a Solution that carries its certificate.
+
+    Args:
+        message: what the solver reported, for the error.
 
     Raises:
         SolveError: the residual is above `tolerance`, or the answer is not finite.
@@ -82,5 +74,5 @@ def certified(
         values.flags.writeable = False
     solution = Solution(problem, wrench, force.reshape(-1, problem.dim), residual, status, method, seconds, edges)
     if not residual <= tolerance:
-        raise SolveError(solution, tolerance, said)
+        raise SolveError(solution, tolerance, message)
     return solution

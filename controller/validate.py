@@ -4,11 +4,12 @@ from math import hypot
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pivoting.errors import PivotingError
 
 Array = NDArray[np.float64]
 
 
-class InputError(ValueError):
+class InputError(PivotingError, ValueError):
     """An argument that cannot be used; the message names it, its value and what is allowed."""
 
 

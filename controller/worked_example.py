@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from pivoting.controller.contacts import Contact
 from pivoting.controller.control_laws import Body, Law
+from pivoting.controller.errors import SolveError
 from pivoting.controller.motion import Motion
-from pivoting.controller.solution import Solution, SolveError
-from pivoting.controller.solvers import methods, solve
+from pivoting.controller.solution import Solution
+from pivoting.controller.solvers.solve import methods, solve
 from pivoting.controller.wrench_controller import WrenchController
 from pivoting.controller.wrench_problem import WrenchProblem
 

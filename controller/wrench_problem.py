@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pivoting.controller.cone_constraints import friction_limits
 from pivoting.controller.friction_pyramid import Polygon, polygon
 from pivoting.controller.kkt_residual import kkt_residual
 from pivoting.controller.validate import Array, array, fail, number, positive_definite
@@ -132,21 +133,14 @@ class WrenchProblem:
         """
         if self.dim != 2 and not edges:
             raise fail("edges", edges, "at least 3 in space, where cones are not linear (inscribed pyramids)")
-        faces = self._pyramid(edges).facets if edges else np.array([[1.0], [-1.0]])
+        if edges:
+            self._pyramid(edges)  # refused in the plane
         nw, n = self.jacobian.shape
-        K = self.contacts
         P = np.zeros((n + nw, n + nw))
         P[:n, :n], P[n:, n:] = self.Q_f, self.Q_w
-        rows, dim = 1 + len(faces), self.dim
-        C = np.zeros((rows * K, n + nw))
-        d = np.zeros(rows * K)
-        for i, (mu, floor) in enumerate(zip(self.mu_planned, self.f_min, strict=True)):
-            normal = dim * (i + 1) - 1
-            C[rows * i, normal] = -1.0
-            d[rows * i] = -floor
-            C[rows * i + 1 : rows * (i + 1), dim * i : normal] = faces
-            C[rows * i + 1 : rows * (i + 1), normal] = -mu
-        return StandardForm(P, np.hstack([self.jacobian, np.eye(nw)]), self.required, C, d)
+        cones = friction_limits(self.mu_planned, self.f_min, self.dim, edges)
+        C = np.hstack([cones.linear, np.zeros((len(cones.linear), nw))])
+        return StandardForm(P, np.hstack([self.jacobian, np.eye(nw)]), self.required, C, cones.linear_side)
 
 
 def wrench_weight(dim: int, length: float = 1.0) -> Array:

@@ -1,9 +1,10 @@
 """Bodies and geoms by name, or by '#id' where they have none; and the error that says what cannot be served."""
 
 import mujoco
+from pivoting.errors import PivotingError
 
 
-class ModelError(ValueError):
+class ModelError(PivotingError, ValueError):
     """A model, or a body in it, that cannot be served; the message says why and what would be."""
 
 

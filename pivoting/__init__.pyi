@@ -1,9 +1,10 @@
 from .controller.control_laws import Body as Body, Law as Law
 from .controller.contacts import Contact as Contact
 from .controller.solution import Solution as Solution
-from .controller.solvers import solve as solve
+from .controller.solvers.solve import solve as solve
 from .controller.wrench_controller import WrenchController as WrenchController
 from .controller.wrench_problem import WrenchProblem as WrenchProblem
+from .errors import PivotingError as PivotingError
 from .sim.attachment import attach as attach
 from .sim.judging.assertions import assert_sticking as assert_sticking, assert_tracking as assert_tracking
 from .sim.run import Run as Run

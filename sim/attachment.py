@@ -11,9 +11,10 @@ from pivoting.controller.kernels.compiled_step import world_wrench
 from pivoting.controller.motion import Motion
 from pivoting.controller.rotations import quaternion_product
 from pivoting.controller.solution import Solution
-from pivoting.controller.solvers import solve
+from pivoting.controller.solvers.solve import solve
 from pivoting.controller.validate import array, fail
 from pivoting.controller.wrench_controller import WrenchController
+from pivoting.errors import PivotingError
 from pivoting.models.frames import matrix
 from pivoting.models.friction_coefficient import read_friction
 from pivoting.models.names import ModelError
@@ -24,7 +25,7 @@ from pivoting.sim.joint_drag import drag_wrench
 Array = NDArray[np.float64]
 
 
-class ControlError(RuntimeError):
+class ControlError(PivotingError, RuntimeError):
     """The state of the simulation cannot be controlled; it carries `time` [s] and `qpos`."""
 
     def __init__(self, message: str, data: mujoco.MjData):

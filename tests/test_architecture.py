@@ -32,6 +32,7 @@ def imported(path: Path) -> set[str]:
 def test_rooms_import_only_what_they_may(path: Path) -> None:
     room = path.relative_to(ROOT).parts[0]
     own = {name.split(".")[1] for name in imported(path) if name.startswith("pivoting.")} - {"__main__"}
+    # What belongs to no room is for all: one `except` must catch the errors of all three, which share nothing else.
     assert own - SHARED <= ROOMS.get(room, set(ROOMS))
     if room == "controller":
         assert not {name for name in imported(path) if name.split(".")[0] in ("mujoco", "rerun")}
@@ -77,8 +78,16 @@ def test_what_is_imported_is_declared() -> None:
                 assert packages.get(top, top) in declared, f"{path}: {top}"
 
 
-def test_importing_the_mathematics_does_not_import_the_simulator() -> None:
-    code = "import sys, pivoting.controller; print([m for m in ('mujoco', 'rerun', 'matplotlib') if m in sys.modules])"
+@pytest.mark.parametrize(
+    ("module", "others"),
+    [
+        ("pivoting.controller", ("mujoco", "rerun", "matplotlib")),
+        ("pivoting.errors", ("numpy", "numba", "mujoco", "pivoting.controller", "pivoting.models", "pivoting.sim")),
+    ],
+)
+def test_what_an_import_does_not_bring_along(module: str, others: tuple[str, ...]) -> None:
+    """The mathematics leave out the simulator, the base of all errors everything."""
+    code = f"import sys, {module}; print([name for name in {others} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 
@@ -119,3 +128,25 @@ def test_functions_are_short_and_take_few_arguments(path: Path) -> None:
     for name, lines, arguments, compiled in functions(path):
         assert lines <= (80 if compiled else 60), name
         assert arguments <= (12 if compiled else 8), name
+
+
+def test_one_base_catches_every_error() -> None:
+    """Those that are raised by others, ValueError and its like, stay what they are as well."""
+    errors = {
+        node.name: {ast.unparse(base) for base in node.bases}
+        for path in FILES
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.ClassDef) and node.name.endswith("Error") and node.name != "PivotingError"
+    }
+    assert {"SolveError", "PlanError", "InputError", "ModelError", "ControlError"} <= set(errors)
+    for name, bases in errors.items():
+        assert "PivotingError" in bases, name
+        assert bases & {"RuntimeError", "ValueError"}, name
+
+
+CALLS = {"clarabel": "clarabel_backend.py", "qpsolvers": "qpsolvers_backend.py", "piqp": "qpsolvers_backend.py"}
+
+
+def test_each_solver_is_called_in_one_place() -> None:
+    for solver, name in CALLS.items():
+        assert [path.name for path in FILES if solver in imported(path)] == [name]

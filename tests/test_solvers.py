@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from pivoting.controller import Solution, SolveError, WrenchProblem, methods, solve
+from pivoting.errors import PivotingError
 
 from tests.conftest import random_problem
 
@@ -94,6 +95,21 @@ def test_a_solver_that_gives_up_is_a_failure_not_a_zero() -> None:
 def test_unknown_methods_are_named(method: str, word: str) -> None:
     with pytest.raises(ValueError, match=rf"method = '{method}'.*{word}"):
         solve(WrenchProblem(J, [0.0, 9.0, 0.0], 0.3), method)
+
+
+@pytest.mark.parametrize("method", ["closed-form", "clarabel", "qp:quadprog"])
+def test_options_that_a_solver_does_not_have_are_named(method: str) -> None:
+    with pytest.raises(ValueError, match=r"options = .*precision"):
+        solve(WrenchProblem(J, [0.0, 9.0, 0.0], 0.3), method, precision=1e-3)
+
+
+@pytest.mark.parametrize("method", ["closed-form", *SHIPPED])
+def test_what_fails_is_caught_as_an_error_of_this_package(method: str) -> None:
+    problem = WrenchProblem(J, [1.0, 9.0, 2.0], 0.3)
+    with pytest.raises(PivotingError):
+        solve(problem, method, tolerance=1e-300)
+    with pytest.raises(PivotingError):
+        solve(problem, method, edges=8)
 
 
 def test_several_contacts_are_solved_by_every_method() -> None:

@@ -16,7 +16,6 @@ from typing import NamedTuple, Self
 
 import numpy as np
 from pivoting.controller.kernels.compilation import kernel, subroutine
-from pivoting.controller.planning.block_matrix import Indices
 from pivoting.controller.rotations import (
     add_product,
     cross,
@@ -28,6 +27,7 @@ from pivoting.controller.rotations import (
     rotation_error,
     turn,
 )
+from pivoting.controller.solvers.block_matrix import Indices
 from pivoting.controller.units import Units
 from pivoting.controller.validate import Array
 

@@ -8,9 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from pivoting.controller.cone_constraints import friction_limits, wrench_limits
-from pivoting.controller.conic_program import Cones, ConicProgram
 from pivoting.controller.mobility import fixed_pairs
-from pivoting.controller.planning.block_matrix import BlockMatrix, Indices, Part
 from pivoting.controller.planning.equations_of_motion import Mechanics, Path, Scratch
 from pivoting.controller.planning.horizon import Horizon
 from pivoting.controller.planning.horizon_rows import (
@@ -23,6 +21,8 @@ from pivoting.controller.planning.horizon_rows import (
 )
 from pivoting.controller.planning.integrators import INTEGRATORS
 from pivoting.controller.rotations import exponential
+from pivoting.controller.solvers.block_matrix import BlockMatrix, Indices, Part
+from pivoting.controller.solvers.conic_program import Cones, ConicProgram
 from pivoting.controller.validate import Array
 
 

@@ -3,14 +3,16 @@
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from pivoting.controller.conic_program import USABLE, ClarabelInPlace, Solver, solver
 from pivoting.controller.planning.equations_of_motion import Path
 from pivoting.controller.planning.horizon import BodyState, Horizon
 from pivoting.controller.planning.horizon_program import Guess, HorizonProgram
 from pivoting.controller.rotations import fill_differences, quaternion_product, rotated
+from pivoting.controller.solvers.clarabel_backend import ClarabelWithRetry
+from pivoting.controller.solvers.conic_program import USABLE, ConicSolver
+from pivoting.controller.solvers.qpsolvers_backend import QuadraticBackend, installed_backend
 from pivoting.controller.validate import Array, array, fail, number, unit_quaternions
 
 CONVERGED = 1e-9  # change of a pass, in weights, levers and radians
@@ -99,18 +101,6 @@ def _frozen(values: Array) -> Array:
     return values
 
 
-class PlanError(RuntimeError):
-    """No plan. Carries the `plan` that was refused, with its status and residual."""
-
-    def __init__(self, plan: Plan):
-        self.plan = plan
-        last = f"its last change was {plan.changes[-1]:.2g}" if plan.changes else "no program had an answer"
-        super().__init__(
-            f"plan: {plan.status} after {plan.passes} passes, {last}, KKT residual {plan.residual:.3g}; "
-            f"the solver said: {plan.said}"
-        )
-
-
 class Planner:
     """Plans for one horizon, with a solver whose structure is kept from plan to plan.
 
@@ -120,7 +110,7 @@ class Planner:
         options: of the solver.
     """
 
-    def __init__(self, horizon: Horizon, method: str | None = None, **options: object):
+    def __init__(self, horizon: Horizon, method: str | None = None, **options: Any):
         if not isinstance(horizon, Horizon):
             raise fail("horizon", horizon, "a Horizon")
         self.horizon = horizon
@@ -129,7 +119,7 @@ class Planner:
         self.method = method or ("clarabel" if cones else "qp:piqp")
         if cones and self.method != "clarabel":
             raise fail("method", method, '"clarabel": this program has second-order cones')
-        self._solve: Solver = solver(self.method, **options)
+        self._solve = _solver(self.method, options)
 
     def guess(self, state: BodyState, desired: tuple[Array, Array] | None = None) -> Guess:
         """About desired poses (N, 3), (N, 4) in world axes, with no forces: J_c of the reference.
@@ -241,10 +231,10 @@ class Planner:
             program = self.program.stated(wanted, now, applied)
             answer = self._solve(program)
             inside, tried = inside + answer.seconds, tried + 1
-            residual, said = answer.residual, answer.said
+            residual, said = answer.residual, answer.message
             if not residual <= USABLE:
                 if "infeasible" not in said.lower() and self.method != "clarabel":  # few backends prove it
-                    said = f"{said}; clarabel: {ClarabelInPlace()(program).said}"
+                    said = f"{said}; clarabel: {ClarabelWithRetry()(program).message}"
                 status = "infeasible" if "infeasible" in said.lower() else "failed"
                 break
             now, change = self.program.corrected(now, answer.x)
@@ -265,6 +255,15 @@ class _Passes(NamedTuple):
     changes: list[float]
     residual: float
     seconds: float
+
+
+def _solver(method: str, options: dict[str, Any]) -> ConicSolver:
+    """What solves the programs of a horizon by "clarabel" or "qp:<backend>", and keeps what it can between them."""
+    if method == "clarabel":
+        return ClarabelWithRetry(**options)
+    if method.startswith("qp:"):
+        return QuadraticBackend(installed_backend(method), **options)
+    raise fail("method", method, "clarabel or qp:<backend>")
 
 
 def _still(start: Path) -> tuple[Array, Array]:

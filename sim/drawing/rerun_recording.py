@@ -26,6 +26,7 @@ import numpy as np
 from pivoting.controller.solution import BOUNDED, FAILED, INACCURATE, STATUS
 from pivoting.controller.solution_space import SolutionSpace
 from pivoting.controller.validate import fail
+from pivoting.errors import PivotingError
 from pivoting.sim.drawing.colours import (
     BLOCK,
     BLUE,
@@ -80,7 +81,7 @@ COMPONENTS = {  # of w by dimension
 }
 
 
-class RecordingOffError(RuntimeError):
+class RecordingOffError(PivotingError, RuntimeError):
     """The environment says that nothing is to be recorded."""
 
 

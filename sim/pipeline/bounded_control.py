@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.bounded_solver import BoundedSolver
-from pivoting.controller.conic_program import USABLE
 from pivoting.controller.solution import BOUNDED, FAILED, INACCURATE
+from pivoting.controller.solvers.conic_program import USABLE
 from pivoting.controller.wrench_bounds import WrenchBounds, fill_excess
 from pivoting.controller.wrench_controller import WrenchController
 from pivoting.sim.pipeline.stages import Answers, Control, States

@@ -2,8 +2,9 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.controller.errors import PlanError
 from pivoting.controller.orientation_references import Turn
-from pivoting.controller.planning.sequential_convex import Plan, PlanError, Planner
+from pivoting.controller.planning.sequential_convex import Plan, Planner
 from pivoting.sim.pipeline.receding_horizon_control import body_state
 from pivoting.sim.pipeline.stages import Answers, States
 

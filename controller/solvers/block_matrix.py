@@ -35,6 +35,12 @@ class Sparse(NamedTuple):
         """The same as a SciPy matrix."""
         return sparse.csc_matrix((self.data, self.indices, self.indptr), shape=self.shape)
 
+    def dense(self, *, mirrored: bool = False) -> Array:
+        """The same as an array (rows, columns); `mirrored`: the symmetric one of which this is the upper triangle."""
+        out = np.zeros(self.shape)
+        _fill_dense(self.data, self.indices, self.indptr, mirrored, out)
+        return out
+
 
 class BlockMatrix:
     """The pattern of a sparse matrix made of parts that do not overlap, and the numbers that do not change."""
@@ -81,3 +87,12 @@ def _scatter(slots, entries, blocks, data):  # type: ignore[no-untyped-def]
     for s in range(slots.shape[0]):
         for e in range(slots.shape[1]):
             data[slots[s, e]] = blocks[s, entries[e] // width, entries[e] % width]
+
+
+@kernel
+def _fill_dense(data, indices, indptr, mirrored, out):  # type: ignore[no-untyped-def]
+    for j in range(out.shape[1]):
+        for k in range(indptr[j], indptr[j + 1]):
+            out[indices[k], j] = data[k]
+            if mirrored:
+                out[j, indices[k]] = data[k]

@@ -1,0 +1,1 @@
+../../pivoting/errors.py

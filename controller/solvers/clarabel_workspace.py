@@ -1,0 +1,57 @@
+"""Clarabel kept for the wrench problems of one shape, one after another."""
+
+from time import perf_counter
+from typing import Any
+
+from pivoting.controller.solution import TOLERANCE, Solution, certified
+from pivoting.controller.solvers.clarabel_backend import SETTINGS, Clarabel
+from pivoting.controller.solvers.wrench_program import wrench_program
+from pivoting.controller.validate import fail, number
+from pivoting.controller.wrench_problem import WrenchProblem
+
+
+class ClarabelWorkspace:
+    """Clarabel set up once for problems of one shape, whose data is replaced in place.
+
+    Args:
+        problem: the first one, which fixes number of contacts and dimension.
+        options: settings of Clarabel, on top of the tight ones that are the default here.
+
+    Raises:
+        ValueError: a setting that Clarabel does not have, or with which its data cannot be replaced.
+    """
+
+    def __init__(self, problem: WrenchProblem, **options: Any):
+        self._problem = problem
+        self._wrench_program = wrench_program(problem.contacts, problem.dim)
+        program, self._unit = self._wrench_program.stated(problem)
+        self._clarabel = Clarabel(program, {**SETTINGS["wrench, in place"], **options})
+        if not self._clarabel.replaceable:
+            raise fail("options", options, "such that Clarabel allows its data to be replaced")
+
+    def update(self, problem: WrenchProblem) -> None:
+        """Replace the problem by another of the same shape.
+
+        Raises:
+            ValueError: another number of contacts or dimension.
+        """
+        if problem.jacobian.shape != self._problem.jacobian.shape:
+            raise fail("problem", problem.jacobian.shape, f"of the workspace's shape {self._problem.jacobian.shape}")
+        program, unit = self._wrench_program.stated(problem)
+        self._clarabel.replace(program)
+        self._problem, self._unit = problem, unit
+
+    def solve(self, *, tolerance: float = TOLERANCE) -> Solution:
+        """The certified answer to the problem set last, see `solve`.
+
+        Raises:
+            SolveError: no answer within tolerance.
+        """
+        number("tolerance", tolerance, above=0.0)
+        start = perf_counter()
+        answer = self._clarabel.solve()
+        wrench, force = self._wrench_program.wrench_and_force(answer.x, self._unit)
+        seconds = perf_counter() - start
+        return certified(
+            self._problem, wrench, force, answer.message, method="clarabel", seconds=seconds, tolerance=tolerance
+        )
