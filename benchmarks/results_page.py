@@ -2,8 +2,8 @@
 
     python benchmarks/results_page.py > docs/results.md
 
-In the template {{FILE max PATTERN FORMAT}} is the greatest of the figures whose names match, min and sum are the others;
-{{machine FILE}} says on what it was measured; {{..._table}} is a table. An unknown name is an error.
+In the template {{FILE max PATTERN FORMAT}} is the greatest of the figures whose names match, and min and sum are what
+they say; {{machine FILE}} says on what it was measured; {{..._table}} is a table. An unknown name is an error.
 """
 
 import json

@@ -1,8 +1,8 @@
 """What the site adds to its pages: formulas as MathML, and the files outside docs/ that pages link to.
 
-A browser draws MathML itself, so that formulas need neither a script nor a network; the font (STIX Two, Open Font License)
-comes with the package ziamath, since few systems have one whose brackets grow. Pages are written for two readers, the site
-and whoever opens the file in the checkout; a link to ../benchmarks/results/loop.json has to work for both.
+A browser draws MathML itself, so that formulas need neither a script nor a network. The font (STIX Two, Open Font
+License) comes with the package ziamath, since few systems have one whose brackets grow. Pages are read on the site and in
+the checkout, and a link to ../benchmarks/results/loop.json has to work in both.
 """
 
 import posixpath
@@ -46,11 +46,9 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
     def moved(match: re.Match[str]) -> str:
         target = posixpath.normpath(posixpath.join(base, match[1]))
-        if target.startswith("docs/"):
-            target = target.removeprefix("docs/")
-        else:
-            target = PAGES.get(target, f"files/{target}")
-        return posixpath.relpath(target, posixpath.dirname(uri) or ".") + match[2]
+        inside = target.startswith("docs/")
+        place = target.removeprefix("docs/") if inside else PAGES.get(target, f"files/{target}")
+        return posixpath.relpath(place, posixpath.dirname(uri) or ".") + match[2]
 
     return LINK.sub(moved, markdown)
 
