@@ -77,7 +77,7 @@ def pyramid_table() -> str:
     values = figures("evidence_space")
     edges = [key.split()[2] for key in values if key.startswith("pyramids") and key.endswith("refused")]
     rows = [
-        [words, *(f"{100.0 * values[f'pyramids of {n} edges: {key}']:.2g}" for n in edges)]
+        [words, *(f"{100.0 * values[f'pyramids of {n} edges: {key}']:.3g}" for n in edges)]
         for words, key in (("median excess, %", "median excess"), ("greatest excess, %", "greatest excess"))
     ]
     return table(["edges of the pyramid", *edges], rows)

@@ -1,8 +1,8 @@
 """What the site adds to its pages: formulas as MathML, and the files outside docs/ that pages link to.
 
 A browser draws MathML itself, so that formulas need neither a script nor a network. The font (STIX Two, Open Font
-License) comes with the package ziamath, since few systems have one whose brackets grow. Pages are read on the site and in
-the checkout, and a link to ../benchmarks/results/loop.json has to work in both.
+License) comes with the package ziamath, since few systems have one whose brackets grow. Pages are read on the site and
+in the checkout, and a link to ../benchmarks/results/loop.json has to work in both.
 """
 
 import posixpath

@@ -1,8 +1,8 @@
 """The code blocks of a page of README or docs/, and how they are run: each alone, as it is pasted.
 
 A block of python is run in an interpreter of its own; a block of text right after it is what it prints. A block with a
-title is a file that the other blocks of its page use. In a console block each command `pivoting` or `pytest` is run, and
-what is shown below it has to appear in its output, in that order; the comment "exits with 1" is the expected status.
+title is a file that the other blocks of its page use. In a console block each command `pivoting` or `pytest` is run,
+and what is shown below it has to appear in its output, in order; the comment "exits with 1" is the status expected.
 """
 
 import os

@@ -1,6 +1,6 @@
 """README is one screen, and its figures, like those of the studies, are those of the committed results.
 
-That its code runs and prints what it shows, and that its links and pictures exist, `test_site.py` checks with all pages.
+`test_site.py` checks for all pages that code runs and prints what it shows, and that links and pictures exist.
 """
 
 import json
@@ -42,6 +42,7 @@ def test_its_table_is_of_the_committed_results() -> None:
     residuals = [value for key, value in space.items() if key.endswith("contacts, space: greatest KKT residual")]
     slip, floor = (1e3 * plane[f"pivot-2d: {key}"] for key in ("slip_max_m", "slip_floor_m"))
     counts = [f"{objects[name]:.0f}" for name in ("objects", "pass", "runs", "fail", "refused")]
+    deciding = saved("loop")["figures"]["one world: state, solve, certify, us"]
     assert plane["closed-form: failures"] == objects["wrong refusals"] == 0.0
     rows = [
         f"| {plane['random problems']:,.0f} random planar problems | all solved; greatest residual "
@@ -53,7 +54,7 @@ def test_its_table_is_of_the_committed_results() -> None:
         "| {} objects from published packages | {} of {} runs pass, {} fail, {} are refused, none wrongly |".format(
             *counts
         ),
-        f"| deciding on a wrench, in the loop | {saved('loop')['figures']['one world: state, solve, certify, us']:.1f} us a step |",
+        f"| deciding on a wrench, in the loop | {deciding:.1f} us a step |",
     ]
     shown = [line for line in TEXT.splitlines() if line.startswith("|")]
     assert shown[3:] == rows

@@ -1,4 +1,4 @@
-"""The site says only what is true: its code runs and prints what it shows, its links lead somewhere, it needs no network."""
+"""The site says only what is true: its code prints what it shows, its links lead somewhere, it needs no network."""
 
 import ast
 import re
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.page_blocks import PAGES, ROOT, Block, blocks, commands, squeezed, started, write_files
+from tests.page_blocks import PAGES, ROOT, Block, blocks, commands, started, write_files
 
 RUN = [(page, block) for page in PAGES for block in blocks(page) if block.language in ("python", "console")]
 PYTHON = [

@@ -1,4 +1,4 @@
-"""The commands that README and the site show do what is shown below them. Apart from `test_site.py`, to run beside it."""
+"""The commands that README and the site show do what is shown below them; a file of its own, run beside test_site."""
 
 from pathlib import Path
 
