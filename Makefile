@@ -4,11 +4,12 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
 PIP := pip install --quiet --disable-pip-version-check
+SITE := NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 TESTS := -m pytest -n 2 --dist loadfile
 UV := .venv-lock/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
 	--custom-compile-command "make lock"
 
-.PHONY: help demo test check latest bench evidence study objects figures lock clean
+.PHONY: help demo test check docs latest bench evidence study objects figures lock clean
 
 demo: $(STAMP)  ## the worked example, a block pivoted in MuJoCo, its verdict, a recording and a picture in out/
 	@mkdir -p out
@@ -19,10 +20,14 @@ demo: $(STAMP)  ## the worked example, a block pivoted in MuJoCo, its verdict, a
 test: $(STAMP)  ## the proof: all tests
 	$(BIN)/python $(TESTS)
 
-check: $(STAMP)  ## lint, format and types
+check: $(STAMP)  ## lint, format, types, and the site, in which every warning is an error
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(SITE)
+
+docs: $(STAMP)  ## the documentation site, in site/: open site/index.html
+	$(SITE)
 
 latest:  ## the newest of every dependency in place of the lock, in .venv-latest, and all tests
 	$(PYTHON) -m venv --clear .venv-latest
@@ -48,7 +53,8 @@ study: $(STAMP)  ## how fast each formulation can pivot, and what a horizon save
 objects: $(STAMP)  ## objects out of published packages, fetched (560 MB) and pivoted
 	$(BIN)/python benchmarks/foreign_objects.py --json benchmarks/results/objects.json
 
-figures: $(STAMP)  ## the pictures that README.md and docs/formulations.md show
+figures: $(STAMP)  ## the pictures of the site, and its page of results
+	$(BIN)/python benchmarks/results_page.py > docs/.results.md && mv docs/.results.md docs/results.md
 	$(BIN)/pivoting example --figure docs/solution-space.png
 	$(BIN)/pivoting render pivot-3d --set reference=return --set seconds=1.7 --fps 20 --out docs/pivot.gif
 	$(BIN)/python benchmarks/bench_formulations.py --figure benchmarks/results/formulations.json docs/formulations.png
@@ -64,7 +70,7 @@ help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-10s%s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 clean:  ## remove everything that was made
-	rm -rf .venv .venv-latest .venv-lock out build dist *.egg-info
+	rm -rf .venv .venv-latest .venv-lock out site build dist *.egg-info
 
 # Nothing is asked of a package registry but the files that the lock names, by their hashes.
 .venv/.locked: lock/dev.txt

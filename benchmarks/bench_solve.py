@@ -309,7 +309,7 @@ def physics(K: int, count: int) -> dict[str, float]:
 
 
 def markdown(figures: dict[str, float]) -> str:
-    """The figures as the tables of the README."""
+    """The figures as the tables of the page of results."""
     lines = []
     for name in FAMILIES:
         lines += peer_table(figures, name, COLUMNS)
