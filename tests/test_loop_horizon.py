@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from pivoting.controller.errors import PlanError
 from pivoting.controller.planning.receding_horizon import OUTCOMES
-from pivoting.controller.planning.sequential_convex import PlanError
 from pivoting.sim import Run, assert_sticking, assert_tracking, simulate
 from pivoting.sim.console.command_line import cli
 
