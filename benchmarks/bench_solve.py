@@ -64,7 +64,7 @@ Route = tuple[Callable[[Instance], tuple[Any, ...]], Callable[..., Any]]
 def instance(data: Data) -> Instance:
     """`data` in every form."""
     problem = stated(data)
-    program, unit = wrench_program(problem.contacts, problem.dim).stated(problem)
+    program, unit = wrench_program(problem.contacts, problem.dim).assemble(problem)
     (A, C), (b, d) = (np.split(whole, [program.cones.zero]) for whole in (program.A.dense(), program.b))
     upper, rows = program.P.csc(), program.A.csc()
     P = program.P.dense(mirrored=True)

@@ -54,7 +54,7 @@ def test_the_program_of_a_wrench_problem_is_the_problem(dim: int, edges: int) ->
     rng = np.random.default_rng(dim + edges)
     for _ in range(20):
         problem = stated(draw(rng, 2, dim))
-        program, unit = wrench_program(2, dim, edges).stated(problem)
+        program, unit = wrench_program(2, dim, edges).assemble(problem)
         f, w = rng.normal(size=2 * dim) * unit, rng.normal(size=3 * dim - 3) * unit
         x = np.concatenate([f, w]) / unit
         weight = max(np.abs(problem.Q_f).max(), np.abs(problem.Q_w).max()) * unit**2

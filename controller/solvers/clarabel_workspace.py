@@ -23,8 +23,8 @@ class ClarabelWorkspace:
 
     def __init__(self, problem: WrenchProblem, **options: Any):
         self._problem = problem
-        self._wrench_program = wrench_program(problem.contacts, problem.dim)
-        program, self._unit = self._wrench_program.stated(problem)
+        self._assembler = wrench_program(problem.contacts, problem.dim)
+        program, self._unit = self._assembler.assemble(problem)
         self._clarabel = Clarabel(program, {**SETTINGS["wrench, in place"], **options})
         if not self._clarabel.replaceable:
             raise fail("options", options, "such that Clarabel allows its data to be replaced")
@@ -37,7 +37,7 @@ class ClarabelWorkspace:
         """
         if problem.jacobian.shape != self._problem.jacobian.shape:
             raise fail("problem", problem.jacobian.shape, f"of the workspace's shape {self._problem.jacobian.shape}")
-        program, unit = self._wrench_program.stated(problem)
+        program, unit = self._assembler.assemble(problem)
         self._clarabel.replace(program)
         self._problem, self._unit = problem, unit
 
@@ -50,7 +50,7 @@ class ClarabelWorkspace:
         number("tolerance", tolerance, above=0.0)
         start = perf_counter()
         answer = self._clarabel.solve()
-        wrench, force = self._wrench_program.wrench_and_force(answer.x, self._unit)
+        wrench, force = self._assembler.wrench_and_force(answer.x, self._unit)
         seconds = perf_counter() - start
         return certified(
             self._problem, wrench, force, answer.message, method="clarabel", seconds=seconds, tolerance=tolerance

@@ -16,7 +16,7 @@ from scipy import sparse
 
 # Options of backends whose own default tolerance is looser than ours; programs are in units of the order of one.
 OPTIONS: dict[str, dict[str, Any]] = {
-    "clarabel": {**SETTINGS["horizon, carefully"], "static_regularization_constant": 1e-9},  # serves wrenches as well
+    "clarabel": {**SETTINGS["horizon, carefully"], "static_regularization_constant": 1e-9},  # for QPs this serves all
     "cvxopt": {"feastol": 1e-10, "abstol": 1e-11, "reltol": 1e-10},
     "ecos": {"feastol": 1e-10, "abstol": 1e-10, "reltol": 1e-10},
     "osqp": {"eps_abs": 1e-9, "eps_rel": 1e-9, "polishing": True, "max_iter": 100_000},
@@ -39,7 +39,7 @@ SPARSE_OPTIONS: dict[str, dict[str, Any]] = {  # on top of those, for sparse mat
         "kkt_solver": "sparse_ldlt_ineq_cond",  # inequalities are taken out first: most rows bear on few columns
     },
 }
-SMALL = 30  # columns up to which matrices are dense where a backend takes both: below it, piqp is faster so
+SMALL = 30  # columns up to which matrices are dense where a backend takes both kinds: piqp is then faster
 
 
 def installed_backend(method: str) -> str:
@@ -75,7 +75,7 @@ class QuadraticBackend:
     def __init__(self, name: str, **options: Any):
         self._name = name
         self._dense, self._sparse = name in _qpsolvers().dense_solvers, name in _qpsolvers().sparse_solvers
-        self._small = 0 if "kkt_solver" in options else SMALL  # those of piqp that have a name are for sparse matrices
+        self._small = 0 if "kkt_solver" in options else SMALL  # such a solver of piqp's is for sparse matrices
         self._options = {**OPTIONS.get(name, {}), **options}
         self._sparse_options = {**self._options, **SPARSE_OPTIONS.get(name, {}), **options}
         if name == "piqp":
@@ -117,7 +117,7 @@ class QuadraticBackend:
         return self._split(program)
 
     def _dense_matrices(self, program: ConicProgram) -> list[Any]:
-        """The same; of so small a program converted in the end, where the backend takes none but sparse ones."""
+        """The same as dense arrays, or converted from them for a backend that takes sparse matrices alone."""
         rows, zero = program.A.dense(), program.cones.zero
         matrices = [program.P.dense(mirrored=True), rows[:zero], rows[zero:]]
         return matrices if self._dense else [sparse.csc_matrix(matrix) for matrix in matrices]

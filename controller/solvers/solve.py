@@ -99,7 +99,7 @@ def _by_closed_form(problem: WrenchProblem, edges: int) -> tuple[Array, Array, s
 
 
 def _by_program(solver: ConicSolver, problem: WrenchProblem, edges: int) -> tuple[Array, Array, str]:
-    form = wrench_program(problem.contacts, problem.dim, edges)
-    program, unit = form.stated(problem)
+    assembler = wrench_program(problem.contacts, problem.dim, edges)
+    program, unit = assembler.assemble(problem)
     answer = solver(program)
-    return *form.wrench_and_force(answer.x, unit), answer.message
+    return *assembler.wrench_and_force(answer.x, unit), answer.message

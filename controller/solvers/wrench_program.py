@@ -11,7 +11,7 @@ from pivoting.controller.wrench_problem import WrenchProblem
 
 
 class WrenchProgram:
-    """States the wrench problems of one shape; all in it is constant.
+    """Assembles the conic programs of wrench problems of one shape; all in it is constant.
 
         min 1/2 f'Q_f f + 1/2 w'Q_w w   s.t.   J f + w = required,   f in its truncated friction cones
 
@@ -46,8 +46,8 @@ class WrenchProgram:
         weights = [part(columns, columns, np.triu(np.ones((len(columns), len(columns))))) for columns in (f, w)]
         self._P = BlockMatrix((n + nw, n + nw), weights)
 
-    def stated(self, problem: WrenchProblem) -> tuple[ConicProgram, float]:
-        """The program, and the unit [N] of its forces: 0 without a load, where the answer is exactly nothing."""
+    def assemble(self, problem: WrenchProblem) -> tuple[ConicProgram, float]:
+        """The program, and the unit [N] of its forces, which is 0 without a load: the answer is then exactly zero."""
         # lists are faster than NumPy for so few; no entry of a positive definite matrix exceeds those on its diagonal
         unit = max(map(abs, problem.required.tolist() + problem.f_min.tolist()))
         scale = unit or 1.0
