@@ -177,6 +177,7 @@ def render(
     world: int,
     seed: int,
     out: Path,
+    *,
     size: str,
     fps: int | None,
     speed: float | None,
