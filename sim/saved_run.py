@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -28,17 +29,7 @@ from pivoting.sim.whole_files import Writer, write_together
 
 SCENARIO, ARRAYS = "scenario.json", "run.nc"  # the files of a run that has a folder to itself
 VERSIONS = {"pivoting": __version__, "mujoco": mujoco.__version__, "numpy": np.__version__}
-_PLAN = (
-    "status",
-    "said",
-    "passes",
-    "changes",
-    "residual",
-    "motion_defect",
-    "stick_defect",
-    "seconds",
-    "solver_seconds",
-)
+_PLAN = sorted({each.name for each in fields(Plan)} - {"program", "desired", "guess"})  # what of a plan is no array
 
 
 def save(run: Run, folder: str | os.PathLike[str]) -> Path:
@@ -49,7 +40,10 @@ def save(run: Run, folder: str | os.PathLike[str]) -> Path:
 
 
 def run_files(run: Run, arrays: str, scenario: str) -> dict[str, Writer]:
-    """What writes a run's two files, by the names that they are to have; the second says what the first has to be."""
+    """The writers of a run's two files, by the names that these are to have.
+
+    The arrays are written first, for the scenario's file says how long their file is, and what its digest is.
+    """
     said = written(description(run))
     kept: dict[str, Any] = {}
 
@@ -80,15 +74,15 @@ def description(run: Run) -> ScenarioFile:
 
 
 def is_run(path: Path, said: Mapping[str, Any]) -> bool:
-    """Whether a scenario's file is of the run that it would say this of, whatever the versions that made it."""
+    """Whether the scenario's file at `path` describes the run that `said` describes, whatever versions made them."""
     try:
         there = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
-    return isinstance(there, dict) and not _others(there, json.loads(json.dumps(said)), ("versions", "arrays"))
+    return isinstance(there, dict) and not _different(there, json.loads(json.dumps(said)), ("versions", "arrays"))
 
 
-def _others(a: Mapping[str, Any], b: Mapping[str, Any], but: tuple[str, ...]) -> list[str]:
+def _different(a: Mapping[str, Any], b: Mapping[str, Any], but: tuple[str, ...]) -> list[str]:
     """The keys, but for some, that are not the same in both."""
     return [key for key in {**a, **b} if key not in but and a.get(key) != b.get(key)]
 
@@ -126,7 +120,8 @@ def load(
     try:
         begun = set_up(case, controller, **counts)
     except ValueError as error:
-        raise type(error)(f"{path}: cannot be set up again: {error}") from None
+        kind = ModelError if isinstance(error, ModelError) else InputError
+        raise kind(f"{path}: cannot be set up again: {error}") from None
     try:
         run = _restored(begun, arrays, outcome, file.python_objects)
     except KeyError as error:
@@ -168,7 +163,7 @@ def _restored(begun: Begun, arrays: Arrays, outcome: Mapping[str, Any], python_o
 def _check(path: Path, run: Run, said: Mapping[str, Any]) -> None:
     """Refuse a run that is not the one that was saved."""
     now = json.loads(json.dumps(written(description(run))))
-    other = _others(said, now, ("model", "versions"))
+    other = _different(said, now, ("model", "versions"))
     if "digest" in other:
         made, here = (", ".join(f"{name} {v}" for name, v in each.items()) for each in (said["versions"], VERSIONS))
         versions = "" if made == here else f"; it was saved by {made}, and this is {here}"

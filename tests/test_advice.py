@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -119,6 +120,18 @@ def test_what_is_said_to_hold_it_does(name: str, failing: dict[str, Run]) -> Non
     again = simulate(run.scenario.change(**dict(pairs)))
     assert again.verdict == "pass", [check for check in again.checks if not check.passed]
     assert found["setting"] in [one.setting for one in remedies(run)]
+
+
+def test_remedies_are_tried_on_the_worlds_that_failed() -> None:
+    run = simulate("snap-2d", 2, seed=3, first_world=5, f_min=0.0)
+    seen: list[Run] = []
+
+    def noted(*arguments: Any, **options: Any) -> Run:
+        seen.append(simulate(*arguments, **options))
+        return seen[-1]
+
+    assert tried(run, noted)["holds"] is not None
+    assert {(one.worlds, one.seed, one.first_world) for one in seen} == {(2, 3, 5)}
 
 
 def test_absurd_inertia_is_held_by_a_floor(failing: dict[str, Run]) -> None:

@@ -18,7 +18,7 @@ from pivoting.models import ModelError
 from pivoting.sim import SCENARIOS, Run, Scenario, simulate
 from pivoting.sim.pipeline.own_control import Moment
 from pivoting.sim.run_arrays import described
-from pivoting.sim.saved_run import _fingerprint
+from pivoting.sim.saved_run import VERSIONS, _fingerprint
 from scipy.io import netcdf_file
 
 from tests.own_files import BOX, FLOOR, mjcf, own
@@ -250,7 +250,8 @@ def test_what_is_not_the_run_is_refused(case: str, kept: tuple[Run, Path], tmp_p
         load(tmp_path)
 
 
-def test_a_model_that_has_changed_is_refused(tmp_path: Path) -> None:
+def test_a_model_that_has_changed_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where other versions read it than wrote it, they are named, for it may be they that make the difference."""
     run = simulate(own(tmp_path, mjcf()))
     run.save(tmp_path / "run")
     own(tmp_path, mjcf(BOX.replace(".06", ".0600001")))
@@ -258,6 +259,10 @@ def test_a_model_that_has_changed_is_refused(tmp_path: Path) -> None:
         ModelError, match=r"scenario.json: the model .*own.xml', .* has changed since the run was saved"
     ):
         load(tmp_path / "run")
+    with monkeypatch.context() as patch:
+        patch.setitem(VERSIONS, "numpy", "1.0")
+        with pytest.raises(ModelError, match=r"; it was saved by .* this is .*numpy 1\.0$"):
+            load(tmp_path / "run")
     own(tmp_path, mjcf(), body="box")
     assert_same(run, load(tmp_path / "run"))
     file = tmp_path / "run" / "scenario.json"
