@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pivoting.controller.planning.sequential_convex import Plan
 from pivoting.sim import Run
-from pivoting.sim.console.tables import jsonable
+from pivoting.sim.console.json_values import jsonable
 from pivoting.sim.drawing.recording_id import digest
 
 SET_UP = ("scenario", "attached", "load", "world")  # which the digest tells apart

@@ -85,16 +85,16 @@ def test_help_has_every_key_with_what_it_may_be() -> None:
 class Noisy(Scenario):
     """A scenario with keys of its own, each declared by its field and by nothing else."""
 
-    noise: float | None = key(
+    blur: float | None = key(
         None,
-        "noise of the angle",
+        "blur of the angle",
         group="sensing",
         unit="deg",
         at_least=0.0,
         none="none",
-        stage="pivoting.sensing:Noise",
+        stage="pivoting.sim.pipeline.measurement_noise:MeasurementNoise",
     )
-    taps: int = key(3, "taps of a filter", group="sensing", at_least=1, needs=Needs("noise"))
+    taps: int = key(3, "taps of a filter", group="sensing", at_least=1, needs=Needs("blur"))
     force_floor: float | str = key(1.0, "a force", group="the controller", unit="N", above=0.0, relative="w")
 
 
@@ -106,26 +106,24 @@ def noisy(**changes: Any) -> Scenario:
 
 def test_a_new_key_needs_nothing_but_its_field() -> None:
     """It is read, checked, told in help and docstring, kept in the changes, resolved, and pickled."""
-    case = noisy(noise="0.5", taps="5", force_floor="0.5w")
+    case = noisy(blur="0.5", taps="5", force_floor="0.5w")
     assert isinstance(case, Noisy)
-    assert (case.noise, case.taps, case.force_floor) == (0.5, 5, "0.5w")
-    assert declared_keys(Noisy)["noise"].stage == "pivoting.sensing:Noise"
+    assert (case.blur, case.taps, case.force_floor) == (0.5, 5, "0.5w")
+    assert declared_keys(Noisy)["blur"].stage == "pivoting.sim.pipeline.measurement_noise:MeasurementNoise"
     rows = dict(dict(described(Noisy))["sensing"])
-    assert rows["noise"] == "noise of the angle [>= 0 deg; default: none]"
-    assert rows["taps"] == "taps of a filter [>= 1; default: 3; only if noise is set]"
-    assert "noise: noise of the angle [>= 0 deg" in (Noisy.__doc__ or "")
+    assert rows["blur"] == "blur of the angle [>= 0 deg; default: none]"
+    assert rows["taps"] == "taps of a filter [>= 1; default: 3; only if blur is set]"
+    assert "blur: blur of the angle [>= 0 deg" in (Noisy.__doc__ or "")
     assert pickle.loads(pickle.dumps(case)) == case
     summary = simulate(case, seconds=0.2).summary()
-    assert (
-        json.loads(json.dumps(summary["changes"])).items() >= {"noise": 0.5, "taps": 5, "force_floor": "0.5w"}.items()
-    )
+    assert json.loads(json.dumps(summary["changes"])).items() >= {"blur": 0.5, "taps": 5, "force_floor": "0.5w"}.items()
     assert summary["resolved"]["force_floor"] == pytest.approx(5.0)
     for changes, message in (
-        ({"noise": -1}, r"noise = -1.0: must be a finite number >= 0 \[deg\]"),
-        ({"noise": "x"}, "noise = 'x': must be a number$"),
-        ({"noise": 1, "taps": 2.5}, "taps = 2.5: must be a whole number"),
-        ({"taps": 4}, "taps = 4: must be left out: it has no effect unless noise is set"),
-        ({"noisy": 1}, "noisy = 1: must be a known key: .*, noise, taps, force_floor, world.mu"),
+        ({"blur": -1}, r"blur = -1.0: must be a finite number >= 0 \[deg\]"),
+        ({"blur": "x"}, "blur = 'x': must be a number$"),
+        ({"blur": 1, "taps": 2.5}, "taps = 2.5: must be a whole number"),
+        ({"taps": 4}, "taps = 4: must be left out: it has no effect unless blur is set"),
+        ({"noisy": 1}, "noisy = 1: must be a known key: .*, blur, taps, force_floor, world.mu"),
     ):
         with pytest.raises(ValueError, match=message):
             noisy(**changes)

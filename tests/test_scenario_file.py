@@ -21,7 +21,7 @@ CASES = [
     SCENARIOS["incline-2d"].change(mu=0.3),  # which takes the world's own away
     SCENARIOS["incline-2d"].change(mu=0.3, **{"world.mu": 0.35, "world.size": 2}),
     SCENARIOS["snap-2d"].change(f_min=None, seconds="2T"),
-    SCENARIOS["pivot-2d"].change(theta=np.float64(0.1) + 0.2 + 11.0, plan_steps=np.int64(7)),
+    SCENARIOS["pivot-2d"].change(theta=np.float64(0.1) + 0.2 + 11.0, plan_hz=100, plan_steps=np.int64(7)),
     MUG,
     MUG.change(force_max="0.8w", limits={"slip_m": 1e-3, "contacts_end": 4}),
     own_object("/somewhere/mug.xml", "#1", np.array([[0.1, 0.2, 1 / 3]]), support="shelf", chosen=False),
