@@ -191,7 +191,7 @@ def test_friction_that_mujoco_does_not_have_is_refused() -> None:
     for changes in ({"mu": 1e-6}, {"world.mu": 1e-6}):
         with pytest.raises(ModelError, match=r"^mu = 1e-06: must be > 1e-05, which is the least friction"):
             simulate("balance-2d", **changes)
-    assert simulate("balance-2d", seconds=0.6, **{"world.mu": 1.1e-5}).mu_world == pytest.approx(1.1e-5)
+    assert simulate("balance-2d", seconds=0.6, **{"world.mu": 1.1e-5}).world.mu == pytest.approx(1.1e-5)
 
 
 @pytest.mark.filterwarnings("error")

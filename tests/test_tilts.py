@@ -96,7 +96,7 @@ each_body = pytest.mark.parametrize(("kind", "seed"), BODIES, ids=lambda value: 
 
 def numbers(shape: Shape, one: Stance) -> list[int]:
     """Which of the shape's corners, balls and rims a stance is about."""
-    if one.world.radius[0] > 0.0:
+    if one.radius[0] > 0.0:
         return [len(shape.corners) + int(np.linalg.norm(shape.balls - one.points[0], axis=1).argmin())]
     found = []
     for point in one.points:
@@ -127,7 +127,7 @@ def test_what_is_found_can_be_tilted_as_far_as_is_said(kind: Callable[..., Built
             held, end = numbers(shape, one), one.range[1]
             normals = np.array([one.up(theta) for theta in np.linspace(0.0, end, 200)])
             clear = shape.clearance(normals, held) / shape.size
-            heights = normals @ one.points.T - one.world.radius
+            heights = normals @ one.points.T - one.radius
             assert np.abs(heights - shape.heights(normals)[:, held]).max() < TOUCHES * shape.size  # they are the lowest
             assert clear[1:-1].min() > -1e-6, (word, one.points, np.rad2deg(end))
             for ends in (0, -1) if end < np.pi - 1e-6 else (0,):
