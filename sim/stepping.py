@@ -93,9 +93,9 @@ def run_steps(
     stage = int(mujoco.mjtStage.mjSTAGE_VEL)
     batch.forward(stage=stage)
     states = States(*(sensordata[:, where[key]] for key in POSE))
-    pose = sensordata[:, where[POSE[0]].start : where[POSE[-1]].stop]
+    pose = slice(where[POSE[0]].start, where[POSE[-1]].stop)
     nw, n = belief.wrench_map.shape[0], belief.Q_f.shape[0]
-    kept = np.empty((steps + 1, *pose.shape))
+    kept = np.empty((steps + 1, worlds, pose.stop - pose.start))
     out = Answers(
         np.empty((steps, worlds, nw)),
         np.empty((steps, worlds, nw)),
@@ -109,7 +109,7 @@ def run_steps(
         control.prepare(states, Answers(*(values[0] for values in out)))
         world_wrench(belief.wrench_map, states.orientation, out.wrench[0], wrench_world[0])
         contacts.sort(0, kept[:0], block[:0])
-    kept[0] = pose
+    kept[0] = sensordata[:, pose]
     report, first = max(1, steps // 100), 0
     start = perf_counter()
     before: Array | None = None
@@ -121,10 +121,11 @@ def run_steps(
         world_wrench(belief.wrench_map, states.orientation, before, wrench_world[k])
         xfrc[:] = wrench_world[k]
         batch.step(stage=stage)
-        kept[k + 1] = pose
         block[k - first] = sensordata
         if k + 1 - first == len(block) or k + 1 == steps:
-            contacts.sort(first, kept[first : k + 1], block[: k + 1 - first])
+            sensed = block[: k + 1 - first]
+            kept[first + 1 : k + 2] = sensed[..., pose]
+            contacts.sort(first, kept[first : k + 1], sensed)
             first = k + 1
         if progress is not None and (k + 1) % report == 0:
             progress(k + 1, steps)
