@@ -52,8 +52,33 @@ def test_results_are_the_committed_ones() -> None:
     for key in ("one world: closed / bare mj_step", "256 worlds: closed / open Batch.step"):
         assert f"{loop[key]:.2f} x" in TEXT
     words = " ".join(TEXT.split())
+    assert f"the ratio is {loop['256 worlds: closed / constant wrench']:.2f} x." in words
+    assert f"takes {loop['one world: state, solve, certify, us']:.1f} us of the first" in words
     assert f"`mpc-2d` runs {loop['mpc-2d: times real time']:.2f} times as fast as real time" in words
     assert f"`mpc-3d` {loop['mpc-3d: times real time']:.2f} times" in words
+
+
+def test_waiting_for_the_compiler_is_as_measured() -> None:
+    compiled = json.loads((ROOT / "benchmarks/results/compile.json").read_text())["figures"]
+    horizon = [name for name in compiled if name.startswith("mpc")]
+    plane = [name for name in compiled if "2d" in name and name not in horizon]
+    kinds = plane, [name for name in compiled if name not in (*plane, *horizon)], horizon
+    told = "up to {:.0f} s in the plane, {:.0f} s in space, {:.0f} s with a horizon"
+    assert told.format(*(max(compiled[name] for name in names) for names in kinds)) in " ".join(TEXT.split())
+
+
+def test_a_pass_of_the_horizon_takes_what_was_measured() -> None:
+    figures = json.loads((ROOT / "benchmarks/results/horizon.json").read_text())["figures"]
+    kinds = [f"{dim}, {how}" for dim in ("plane", "space") for how in ("quasi-dynamic", "semi-implicit")]
+    ours = {kind: figures[f"{kind}: ours, one pass, ms"] for kind in (*kinds, *(f"{kind}, bounded" for kind in kinds))}
+    bound = [ours[f"{kind}, bounded"] / ours[kind] for kind in kinds]
+    peers, peers_at_bounds = ([figures[f"{kind}{tail}: cvxpy / ours"] for kind in kinds] for tail in ("", ", bounded"))
+    words = " ".join(TEXT.split())
+    assert f"takes {ours[kinds[0]]:.2f} to {ours[kinds[1]]:.2f} ms in the plane" in words
+    assert f"and {ours[kinds[2]]:.2f} to {ours[kinds[3]]:.2f} in space" in words
+    assert f"compiled once, {min(peers):.1f} to {max(peers):.1f} times as long" in words
+    assert f"At bounds it takes {min(bound):.1f} to {max(bound):.1f} times as long" in words
+    assert f"through cvxpy {min(peers_at_bounds):.1f} to {max(peers_at_bounds):.1f} times ours" in words
 
 
 def test_agreement_with_clarabel_is_the_committed_one() -> None:
