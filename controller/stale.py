@@ -7,7 +7,7 @@ import hashlib
 import os
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from types import FunctionType
 
 from numba import njit
 
@@ -15,10 +15,9 @@ from numba import njit
 def cache_folder(room: Path) -> Path | None:
     """Where numba keeps what it compiles of a room: NUMBA_CACHE_DIR, else beside the sources, else in the user's cache;
     None where it can write to none of them, and would raise for each function that asks for a cache."""
-    function: dict[str, Any] = {}
-    exec(compile("def anything(): pass", str(room / "__init__.py"), "exec"), function)
+    code = (lambda: None).__code__.replace(co_filename=str(room / "__init__.py"))
     try:
-        return Path(njit(cache=True)(function["anything"]).stats.cache_path)
+        return Path(njit(cache=True)(FunctionType(code, {})).stats.cache_path)
     except RuntimeError:
         return None
 
