@@ -59,8 +59,7 @@ class ContactRows(NamedTuple):
 
     def softness(self, depth: Array) -> Array:
         """R / D = (1 - d) / d (...) at depths (...) below the margin [m]."""
-        d = self.impedance(depth)
-        return (1.0 - d) / d
+        return softness(self.impedance(depth))
 
     def depth(self, load: ArrayLike) -> Array:
         """(...) how far below the margin a contact rests [m] under normal loads (...) [N]: k d delta = R f.
@@ -83,6 +82,11 @@ def impedance(depth: Any, low: Any, high: Any, width: Any, middle: Any, power: A
     rising, left = np.minimum(x, middle), 1.0 - np.maximum(x, middle)
     risen = rising**power / middle ** (power - 1.0) + (1.0 - middle) - left**power / (1.0 - middle) ** (power - 1.0)
     return low + (high - low) * risen
+
+
+def softness(d: Any) -> Any:
+    """R / D at an impedance d; of arrays or compiled floats."""
+    return (1.0 - d) / d
 
 
 def read_rows(model: mujoco.MjModel, body: int, support: int, placements: Iterable[Array]) -> ContactRows | None:

@@ -24,7 +24,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.kernels.compilation import subroutine
-from pivoting.models.contact_softness import ContactRows, impedance
+from pivoting.models.contact_softness import ContactRows, impedance, softness
 
 Array = NDArray[np.float64]
 SLIDES = 1.0 - 1e-9  # of its friction: MuJoCo's cone is exact to rounding
@@ -33,7 +33,7 @@ END = 0.98  # least share of a contact that alone holds an end of an edge
 TINY = 1e-300
 UNHELD = 10  # steps on end that an end of an edge may be without contact while another contact holds
 
-_impedance = subroutine(impedance)
+_impedance, _softness = subroutine(impedance), subroutine(softness)
 
 
 class RowEffects(NamedTuple):
@@ -141,7 +141,7 @@ def add_row(rows, push, pulls, depth, where, tangent, other, at, share, sums):  
     d = solimp[0]
     if solimp[1] != d:  # powers take long
         d = _impedance(depth + margin, *solimp)
-    soft = (1.0 - d) / d
+    soft = _softness(d)
     a, b = soft * lean[0] * D[0] * pulls[0], soft * lean[1] * D[1] * pulls[1]
     x, y, z = a * tangent[0] + b * other[0], a * tangent[1] + b * other[1], a * tangent[2] + b * other[2]
     give = dot(axes[0], x, y, z), dot(axes[1], x, y, z)
