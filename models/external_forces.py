@@ -6,7 +6,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.models.names import ModelError, body_name, label
+from pivoting.models.errors import ModelError
+from pivoting.models.names import body_name, label
 
 Array = NDArray[np.float64]
 OBJ = mujoco.mjtObj

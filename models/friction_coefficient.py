@@ -5,8 +5,9 @@ from collections.abc import Iterable
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
+from pivoting.models.errors import ModelError
 from pivoting.models.mujoco_constants import LEAST_FRICTION
-from pivoting.models.names import ModelError, label
+from pivoting.models.names import label
 from pivoting.models.placement.convex_hull import body_size, ellipsoids
 from pivoting.models.support_surfaces import can_collide
 

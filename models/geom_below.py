@@ -7,7 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.models.names import ModelError
+from pivoting.models.errors import ModelError
 from pivoting.models.placement.convex_hull import ellipsoids, samples
 
 Array = NDArray[np.float64]

@@ -1,11 +1,7 @@
-"""Bodies and geoms by name, or by '#id' where they have none; and the error that says what cannot be served."""
+"""Bodies and geoms by name, or by '#id' where they have none."""
 
 import mujoco
-from pivoting.errors import PivotingError
-
-
-class ModelError(PivotingError, ValueError):
-    """A model, or a body in it, that cannot be served; the message says why and what would be."""
+from pivoting.models.errors import ModelError
 
 
 def body_name(model: mujoco.MjModel, body: int) -> str:

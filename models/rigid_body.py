@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
+from pivoting.models.errors import ModelError
 from pivoting.models.external_forces import JointDrag, read_drag, refuse_unknown_forces
 from pivoting.models.frames import Array, matrix, quaternion
-from pivoting.models.names import ModelError, body_id, body_name
+from pivoting.models.names import body_id, body_name
 from pivoting.models.support_surfaces import Surface, find_support, support_surface
 
 PLANAR_JOINTS = "two perpendicular slides and then a hinge about their normal"

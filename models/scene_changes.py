@@ -7,8 +7,8 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from pivoting.models.errors import ModelError
 from pivoting.models.mujoco_constants import LEAST_FRICTION
-from pivoting.models.names import ModelError
 
 INERTIA_FROM_GEOM = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
 _GRAVITY_OFF = int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)

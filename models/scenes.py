@@ -10,9 +10,10 @@ from typing import Any
 import mujoco
 import numpy as np
 from pivoting.models.contact_settings import STIFF, ContactSettings
+from pivoting.models.errors import ModelError
 from pivoting.models.frames import Array
 from pivoting.models.length_unit import length_unit
-from pivoting.models.names import ModelError, body_id, body_name
+from pivoting.models.names import body_id, body_name
 from pivoting.models.rigid_body import FILE_FRAME, degrees_of_freedom, initial_data
 from pivoting.models.scene_changes import CHANGES, Edit
 from pivoting.models.shipped_files import BODY, TABLE, scene_path

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pivoting.models.errors import ModelError
 from pivoting.models.geom_below import first_met
-from pivoting.models.names import ModelError, body_name, geom_id, label
+from pivoting.models.names import body_name, geom_id, label
 from pivoting.models.placement.convex_hull import colliding
 
 Array = NDArray[np.float64]

@@ -1,12 +1,12 @@
 """The base of every error that this package raises: one `except PivotingError` catches them all.
 
-Each kind is defined where it arises, and is also a RuntimeError or a ValueError:
+Each kind is defined where it arises, and is also a RuntimeError, a ValueError or an OSError:
 
     pivoting.controller.errors      SolveError, PlanError: a solver has no answer that may be used
     pivoting.controller.validate    InputError: an argument that cannot be used
-    pivoting.models.names           ModelError: a MuJoCo model that cannot be served
-    pivoting.sim.attach             ControlError: a state of the simulation that cannot be controlled
-    pivoting.sim.drawing            RecordingOffError: the environment forbids recordings
+    pivoting.models.errors          ModelError: a MuJoCo model that cannot be served
+    pivoting.sim.attachment         ControlError: a state of the simulation that cannot be controlled
+    pivoting.sim.drawing            RecordingOffError, GraphicsError: no recordings are wanted, nothing can be rendered
 """
 
 

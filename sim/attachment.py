@@ -15,9 +15,9 @@ from pivoting.controller.solvers.solve import solve
 from pivoting.controller.validate import array, fail
 from pivoting.controller.wrench_controller import WrenchController
 from pivoting.errors import PivotingError
+from pivoting.models.errors import ModelError
 from pivoting.models.frames import matrix
 from pivoting.models.friction_coefficient import read_friction
-from pivoting.models.names import ModelError
 from pivoting.models.placement.points_on_body import refuse_off_body
 from pivoting.models.rigid_body import RigidBody, read_body
 from pivoting.sim.joint_drag import drag_wrench

@@ -7,8 +7,9 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pivoting.controller.rotations import exponential, quaternion_product
+from pivoting.models.errors import ModelError
 from pivoting.models.frames import matrix, quaternion
-from pivoting.models.names import ModelError, label
+from pivoting.models.names import label
 from pivoting.models.placement.contact_candidates import planar_stance, stance
 from pivoting.models.placement.convex_hull import body_size
 from pivoting.models.placement.edge_grip import grip

@@ -15,7 +15,7 @@ from pivoting.controller.planning.horizon_program import HorizonProgram
 from pivoting.controller.planning.sequential_convex import Plan
 from pivoting.controller.validate import InputError
 from pivoting.controller.wrench_controller import WrenchController
-from pivoting.models.names import ModelError
+from pivoting.models.errors import ModelError
 from pivoting.sim.drawing.recording_id import digest
 from pivoting.sim.netcdf import read_netcdf, write_netcdf
 from pivoting.sim.pipeline.plan_log import Event

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from pivoting.controller.orientation_references import Turn
 from pivoting.controller.validate import fail
 from pivoting.controller.wrench_controller import WrenchController
+from pivoting.models.errors import ModelError
 from pivoting.models.frames import matrix
-from pivoting.models.names import ModelError
 from pivoting.models.scenes import load
 from pivoting.sim.belief import Believed, believe
 from pivoting.sim.engine_log import engine_log

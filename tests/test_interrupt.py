@@ -40,7 +40,7 @@ def interrupted_when(seen: Callable[[], bool], process: subprocess.Popen[str], t
 @pytest.mark.skipif(sys.platform != "linux", reason="looks at /proc for what is loaded")
 @pytest.mark.parametrize("library", ["_multiarray_umath", "llvmlite", "libmujoco", "scipy"])
 def test_while_libraries_are_imported(library: str) -> None:
-    process = started("list")
+    process = started("run", "balance-2d")
     maps = Path(f"/proc/{process.pid}/maps")
     interrupted_when(lambda: library in maps.read_text(), process)
 
@@ -135,7 +135,7 @@ main()
 
 @pytest.mark.parametrize(("what", "first"), [("lost", []), ("renamed", []), ("twice", ["tidied up"])])
 def test_whatever_a_library_makes_of_it(what: str, first: list[str]) -> None:
-    call = [sys.executable, "-c", LIBRARY.replace("{what}", what), "list"]
+    call = [sys.executable, "-c", LIBRARY.replace("{what}", what), "run", "balance-2d"]
     done = subprocess.run(call, capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stdout) == (130, "")
     told = [line for line in done.stderr.splitlines() if not line.startswith("pivoting: compiling")]

@@ -30,7 +30,7 @@ def loud(problem, **options):
 
 class Finder:
     def find_spec(self, name, path=None, target=None):
-        if name == "mujoco":
+        if name == "numba":
             noise("import")
 
 qpsolvers.solvers.solve_function["loud"] = loud

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pivoting.models.names import ModelError
+from pivoting.models.errors import ModelError
 from pivoting.sim import Run, own_object, simulate
 
 FLOOR = '<geom name="floor" type="plane" size="2 2 .1"/>'

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 import pytest
-from pivoting.models.names import ModelError
+from pivoting.models.errors import ModelError
 from pivoting.models.placement.contact_search import search
 from pivoting.models.placement.convex_hull import Hull, read_hull
 from pivoting.models.placement.tilt_range import LEAST, Arc, Stance

@@ -40,18 +40,7 @@ class HorizonProgram:
     def __init__(self, horizon: Horizon):
         belief, space, N = horizon.controller.belief, horizon.controller.space, horizon.steps
         self.horizon, self._belief, self._units = horizon, belief, horizon.controller.units
-        used, component = np.nonzero(belief.wrench_map)
-        self._body = Mechanics(
-            mass=belief.mass,
-            inertia=np.array(belief.inertia),
-            points=belief.points,
-            pivot=belief.pivot,
-            frames=np.ascontiguousarray(horizon.table.T @ belief.frames @ belief.force_map),
-            gravity=horizon.table.T @ belief.gravity,
-            pick=component,
-            sign=belief.wrench_map[used, component],
-            units=self._units,
-        )
+        self._body = _mechanics(horizon)
         force, scale = self._units.force, self._units.wrench
         nq, n = len(belief.Q_w), len(belief.Q_f)
         self._fixed = fixed_pairs(belief.points, belief.pivot, belief.wrench_map)
@@ -176,6 +165,23 @@ class HorizonProgram:
         curvature = np.empty((N, len(W), len(W)))
         fill_tracking(self._body, self._Q, path, *wanted, Scratch.empty(), curvature, np.empty((N, len(W))))
         return self._rows(guess), curvature
+
+
+def _mechanics(horizon: Horizon) -> Mechanics:
+    """The object of a horizon, in table axes."""
+    belief = horizon.controller.belief
+    used, component = np.nonzero(belief.wrench_map)
+    return Mechanics(
+        mass=belief.mass,
+        inertia=np.array(belief.inertia),
+        points=belief.points,
+        pivot=belief.pivot,
+        frames=np.ascontiguousarray(horizon.table.T @ belief.frames @ belief.force_map),
+        gravity=horizon.table.T @ belief.gravity,
+        pick=component,
+        sign=belief.wrench_map[used, component],
+        units=horizon.controller.units,
+    )
 
 
 def _pattern(blocks: Array) -> Array:

@@ -139,6 +139,16 @@ class Planner:
         zeros = np.zeros((N, len(belief.Q_w))), np.zeros((N, len(belief.Q_f)))
         return Guess(path, *(zeros if forces is None else forces))
 
+    def _guesses(
+        self, start: Path, wanted: tuple[Array, Array], guess: Guess | None, forces: tuple[Array, Array] | None
+    ) -> list[Guess]:
+        """About what the first program is stated, and what is tried if it has no answer; see `plan`."""
+        if guess is not None:
+            return [self._begun(guess, start)]
+        if forces is not None:
+            return [self._about(start, wanted, self._forces("forces", forces))]
+        return [self._about(start, wanted), self._about(start, _still(start))]
+
     def _begun(self, guess: Guess, start: Path) -> Guess:
         """A guess that was made for another state, from this one."""
         N = self.horizon.steps
@@ -192,14 +202,8 @@ class Planner:
             raise fail("forces", "given beside a guess", "left out: the guess has its own")
         began = perf_counter()
         start, wanted = self.horizon.start(state), self.horizon.desired(*desired)
-        if guess is not None:
-            guesses = [self._begun(guess, start)]
-        elif forces is not None:
-            guesses = [self._about(start, wanted, self._forces("forces", forces))]
-        else:
-            guesses = [self._about(start, wanted), self._about(start, _still(start))]
         inside, tried = 0.0, 0
-        for now in guesses:
+        for now in self._guesses(start, wanted, guess, forces):
             found = self._passes(now, wanted, applied, int(passes), tolerance)
             inside, tried = inside + found.seconds, tried + found.tried
             if found.changes:

@@ -80,17 +80,19 @@ def program_residual(program: ConicProgram, x: Array, z: Array) -> float:
     Distance of s from its cone, of z from the dual one, stationarity, complementarity; nan if they are not finite.
     """
     P, A, (zero, linear, orders) = program.P, program.A, program.cones
-    sizes = np.array(orders, dtype=np.int64)
-    matrices = P.data, P.indices, P.indptr, A.data, A.indices, A.indptr
+    cones = zero, linear, np.array(orders, dtype=np.int64)
+    matrices = (P.data, P.indices, P.indptr), (A.data, A.indices, A.indptr)
     sums = np.zeros(len(x)), np.zeros(len(x)), program.b.copy(), np.zeros(len(z))
-    return float(_residual(*matrices, program.q, program.b, zero, linear, sizes, x, z, *sums))
+    return float(_residual(*matrices, program.q, program.b, cones, x, z, sums))
 
 
 @kernel
-def _residual(  # type: ignore[no-untyped-def]
-    P, P_row, P_column, A, A_row, A_column, q, b, zero, linear, orders, x, z, curved, pull, s, terms
-):
-    """As `program_residual`. The last four are scratch: at first 0, 0, b and 0; on return P x, A'z, b - A x, |A||x|."""
+def _residual(curvature, rows, q, b, cones, x, z, sums):  # type: ignore[no-untyped-def]
+    """As `program_residual`, of matrices by columns; `sums` are 0, 0, b, 0, and become P x, A'z, b - A x, |A||x|."""
+    P, P_row, P_column = curvature
+    A, A_row, A_column = rows
+    zero, linear, orders = cones
+    curved, pull, s, terms = sums
     n, m = q.shape[0], b.shape[0]
     for j in range(n):
         for k in range(P_column[j], P_column[j + 1]):

@@ -11,8 +11,8 @@ from itertools import chain, islice
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
+from pivoting.models.errors import ModelError
 from pivoting.models.frames import Array, matrix
-from pivoting.models.names import ModelError
 from pivoting.models.placement.contact_search import held_at, search, widest
 from pivoting.models.placement.convex_hull import TOLERANCE, Hull, read_hull
 from pivoting.models.placement.edge_grip import Grip

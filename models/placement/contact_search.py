@@ -4,8 +4,8 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pivoting.models.errors import ModelError
 from pivoting.models.frames import Array
-from pivoting.models.names import ModelError
 from pivoting.models.placement.convex_hull import Hull, Indices
 from pivoting.models.placement.given_contacts import ALLOWED, Shown, as_compiled, held_by_hand
 from pivoting.models.placement.resting_faces import SAME, SLACK, Face, face, faces, middle, promising, standing

@@ -13,8 +13,9 @@ from itertools import product
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.models.errors import ModelError
 from pivoting.models.frames import Array, matrix
-from pivoting.models.names import ModelError, body_name, label
+from pivoting.models.names import body_name, label
 from scipy.spatial import ConvexHull, QhullError
 
 Indices = NDArray[np.int64]

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pivoting.models.errors import ModelError
 from pivoting.models.frames import Array
-from pivoting.models.names import ModelError
 from pivoting.models.placement.convex_hull import Hull
 from pivoting.models.placement.tilt_range import Held
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
+from pivoting.models.errors import ModelError
 from pivoting.models.frames import Array, matrix
-from pivoting.models.names import ModelError
 from pivoting.models.placement.convex_hull import SAMPLES, colliding, ellipsoids
 from pivoting.models.rigid_body import RigidBody
 from scipy.spatial import ConvexHull

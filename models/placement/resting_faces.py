@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.models.errors import ModelError
 from pivoting.models.frames import Array
-from pivoting.models.names import ModelError
 from pivoting.models.placement.convex_hull import Hull, Indices, outline
 
 HOVERS = 1.0  # of its size: a body that is farther above a table stands on nothing there

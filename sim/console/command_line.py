@@ -1,5 +1,6 @@
 """The command line: `pivoting example | list | contacts | run | render`. Exit 0: pass, 1: fail, 2: one line of why."""
 
+import os
 import sys
 import tempfile
 from collections.abc import Callable
@@ -8,6 +9,7 @@ from typing import Any
 
 import click
 from pivoting import __version__
+from pivoting.errors import PivotingError
 from pivoting.sim.console.scenario_options import scenario_options
 from pivoting.sim.console.stdout import JsonOutput, console, json_option
 
@@ -258,16 +260,21 @@ def main() -> int:
         raise
     except _wrong_uses() as error:
         return _refuse(str(error))
-    except RuntimeError as error:  # no certified answer: the run ends without a verdict
+    except PivotingError as error:  # no certified answer: the run ends without a verdict
         click.echo(f"pivoting: {error}", err=True)
         return 1
+    except RuntimeError as error:
+        if "environment variable MUJOCO_GL" not in str(error):
+            raise
+        given = os.environ["MUJOCO_GL"]  # at which MuJoCo refuses to be imported at all
+        return _refuse(f"MUJOCO_GL = {given!r}: must be one of egl, osmesa, glfw (macOS: cgl, glfw), off, or not set")
     return code
 
 
 def _wrong_uses() -> tuple[type[Exception], ...]:
     """What is raised of arguments, models and files that cannot be used; any other ValueError is a fault of ours."""
     from pivoting.controller.validate import InputError
-    from pivoting.models import ModelError
+    from pivoting.models.errors import ModelError
 
     return InputError, ModelError, OSError
 

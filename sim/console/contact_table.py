@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pivoting.models.names import ModelError
+from pivoting.models.errors import ModelError
 from pivoting.models.placement.contact_listing import Candidate, contacts
 from pivoting.models.placement.refusals import bounds, option
 from pivoting.models.placement.tilt_range import Arc

@@ -14,6 +14,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.errors import PivotingError
 
 Picture = NDArray[np.uint8]
 DEFAULT = {"linux": "egl", "darwin": "cgl"}  # elsewhere glfw
@@ -24,7 +25,7 @@ HELP = (
 )
 
 
-class GraphicsError(OSError):
+class GraphicsError(PivotingError, OSError):
     """This machine has no OpenGL to render with; the message says what to install and which variable to set."""
 
 

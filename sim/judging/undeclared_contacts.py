@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 from pivoting.models.body_contacts import forced
-from pivoting.models.names import ModelError, label
+from pivoting.models.errors import ModelError
+from pivoting.models.names import label
 from pivoting.models.rigid_body import RigidBody, initial_data
 from pivoting.sim.engine_log import engine_log
 
