@@ -38,9 +38,11 @@ def test_what_is_written_is_read_again(case: Scenario, tmp_path: Path) -> None:
     file = ScenarioFile(case, 3, seed=10**20, first_world=2, open_loop=True, digest="abc", versions={"numpy": "2"})
     (tmp_path / "it.json").write_text(json.dumps(written(file)))
     again = read(tmp_path / "it.json")
+    assert replace(again, case=None) == replace(file, case=None)
+    for name in ("name", "summary", "body", "support", "chosen", "about", "path", "changes"):
+        assert getattr(again.scenario, name) == getattr(case, name), name
     points = case.contact if isinstance(case.contact, str) else np.asarray(case.contact).tolist()
-    assert again == replace(file, case=replace(case, contact=points))
-    assert again.scenario.changes == case.changes
+    assert again.scenario.contact == points
     assert again.scenario.label == case.label
 
 

@@ -147,11 +147,20 @@ class Scenario(ScenarioKeys):
 
     @property
     def changes(self) -> dict[str, Any]:
-        """What was set, and what else differs from the shipped scenario of this name, or else from the defaults."""
+        """What was set, and what else with an effect is not as in the shipped scenario of this name, or by default."""
         from pivoting.sim.scenarios.shipped_scenarios import shipped  # which are made of this
 
         then = (shipped(self) or type(self)(self.name, self.summary, self.scene))._values
-        return {k: value for k, value in self._values.items() if k in self.given or k not in then or then[k] != value}
+        return {
+            key: value
+            for key, value in self._values.items()
+            if key in self.given or key not in then or (then[key] != value and self._effective(key))
+        }
+
+    def _effective(self, name: str, open_loop: bool = True) -> bool:
+        """Whether a key has an effect beside the values of the others; see `refuse_without_effect`."""
+        needs = self._keys[name].needs if name in self._keys else None
+        return needs is None or needs.met(name, self, open_loop)
 
     @property
     def _values(self) -> dict[str, Any]:
@@ -286,6 +295,5 @@ class Scenario(ScenarioKeys):
         """
         asked = set(keys)
         for name, key in self._keys.items():
-            needs = key.needs
-            if name in asked and needs is not None and not needs.met(name, self, open_loop):
-                raise fail(name, getattr(self, name), f"left out: it has no effect unless {needs.condition(name)}")
+            if name in asked and key.needs is not None and not self._effective(name, open_loop):
+                raise fail(name, getattr(self, name), f"left out: it has no effect unless {key.needs.condition(name)}")
