@@ -95,9 +95,9 @@ class Attached:
         Arguments and errors as for `solution`.
         """
         answer = self.solution(data, reference)
-        out = np.empty((1, 6))
-        world_wrench(self.controller.belief.wrench_map, self._orientation(data)[None], answer.wrench[None], out)
-        return out[0]
+        out = np.empty(6)
+        world_wrench(self.controller.belief.wrench_map, self._orientation(data), answer.wrench, out)
+        return out
 
 
 def attach(

@@ -85,6 +85,7 @@ for _name in STATES:
     _dims, _unit, _what = _MEANINGS[_name]
     for _seen in ("measured", "estimated"):
         _MEANINGS[f"{_seen}_{_name}"] = (_dims.replace("state", "step"), _unit, f"{_what}, as it is {_seen}")
+_ANSWERS = ("required", "wrench", "force", "residual", "status")  # as `Answers.values` has them
 _WORDS = {"status": STATUS, "plans_outcome": OUTCOMES}  # what their numbers stand for
 
 
@@ -98,7 +99,8 @@ def named_arrays(run: "Run") -> dict[str, Array]:
     found |= (
         _of_states("", log.states) | _of_states("measured_", log.measured) | _of_states("estimated_", log.estimated)
     )
-    found |= {**log.answers._asdict(), "force": run.force, "acting": log.acting, "wrench_world": log.wrench_world}
+    found |= {name: getattr(log.answers, name) for name in _ANSWERS}
+    found |= {"force": run.force, "acting": log.acting, "wrench_world": log.wrench_world}
     found |= _of_fields("contact_", log.contacts) | _of_fields("held_", log.held) | {"control_ns": log.control_ns}
     found |= dict(zip(("start_qpos", "start_qvel"), run.start, strict=True))
     if run.plans is not None:
@@ -140,14 +142,15 @@ def log_of(arrays: Arrays) -> Log:
         KeyError: an array is missing.
     """
     stepped = {name: np.moveaxis(values, 1, 0).copy() for name, values in arrays.items() if values.ndim > 1}
-    force = stepped["force"]
-    answers = {**stepped, "force": force.reshape(*force.shape[:2], -1)}
+    flat = {name: stepped[name].reshape(*stepped[name].shape[:2], -1) for name in _ANSWERS if name != "status"}
     return worlds_first(
         Log(
             states=_joined("", stepped),
             measured=_joined("measured_", stepped) if "measured_position" in stepped else None,
             estimated=_joined("estimated_", stepped) if "estimated_position" in stepped else None,
-            answers=Answers(**{name: answers[name] for name in Answers._fields}),
+            answers=Answers(
+                np.concatenate(list(flat.values()), axis=-1), stepped["status"], stepped["wrench"].shape[-1]
+            ),
             acting=stepped.get("acting"),
             wrench_world=stepped["wrench_world"],
             contacts=ContactReadings(**{name: stepped[f"contact_{name}"] for name in ContactReadings._fields}),

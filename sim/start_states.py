@@ -27,7 +27,7 @@ def resting_depth(world: World, attached: Attached, law: LawControl, told: Sampl
     controller = attached.controller
     states = States.turning(told[0][:1], told[1][:1])
     nw, d, K = len(controller.Q_w), controller.space.dim, len(controller.contacts)
-    out = Answers(np.empty((1, nw)), np.empty((1, nw)), np.empty((1, K * d)), np.empty(1), np.empty(1, np.int8))
+    out = Answers.empty((1,), nw, K * d)
     with first_calls():
         law.prepare(states, out)
     load = float(out.force.reshape(K, d)[:, -1].sum())

@@ -16,8 +16,11 @@ def altered(run: Run, **arrays: Any) -> Run:
     for name, values in arrays.items():
         if name in COLUMNS:
             states[..., COLUMNS[name]] = values
-        elif name in answers._fields:
-            answers = answers._replace(**{name: values})
+        elif name == "status":
+            answers = answers._replace(status=values)
+        elif name in ("required", "wrench", "force", "residual"):
+            answers = answers._replace(values=answers.values.copy())
+            getattr(answers, name)[...] = values
         elif name == "force_measured":
             with np.errstate(invalid="ignore"):
                 force = values @ np.linalg.pinv(run.table_axes @ run.space.force_map)

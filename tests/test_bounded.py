@@ -180,12 +180,13 @@ def test_a_bound_is_a_heavier_weight(controller: WrenchController, kind: str) ->
     belief, work, units = tuple(controller.belief), controller.workspace(), controller.units
 
     def step(bounds: WrenchBounds, angle: float, wanted: float) -> tuple[np.ndarray, ...]:
-        out = np.empty((1, nw)), np.empty((1, nw)), np.empty((1, n)), np.empty(1), np.empty(1, np.int8)
+        out, status = np.empty((1, 2 * nw + n + 1)), np.empty(1, np.int8)
         q, q_d = tilted(angle)[None], tilted(wanted)[None]
         own, none = tuple(bounds.stacked(nw)), np.zeros((1, nw))
-        step_worlds(belief, own, *work, 1e-9, np.hstack([still, q, still, still]), (q_d, still, still), none, out)
-        assert out[4][0] == 0
-        return tuple(values[0] for values in out[:3])
+        state, desired = np.hstack([still, q, still, still]), np.hstack([q_d, still, still])
+        step_worlds(belief, own, *work, 1e-9, state, desired, none, out, status)
+        assert status[0] == 0
+        return tuple(np.split(out[0, :-1], [nw, 2 * nw]))
 
     def cost(wrench: np.ndarray, force: np.ndarray) -> float:
         return float(wrench @ controller.Q_w @ wrench + force @ controller.Q_f @ force)

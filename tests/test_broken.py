@@ -1,5 +1,7 @@
 """Broken on purpose, it is caught: each mistake that physics.md warns of makes the verdict "fail"."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from pivoting.controller import Body, Contact, Law, WrenchController
@@ -47,16 +49,18 @@ def test_exactly_on_the_edge_nothing_sticks() -> None:
 def test_the_wrench_in_the_wrong_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     """Object axes written to xfrc_applied as if they were the world's."""
 
-    def unturned(wrench_map: np.ndarray, q: np.ndarray, wrench: np.ndarray, out: np.ndarray) -> None:
-        out[:] = wrench @ wrench_map
+    honest = apply_wrench.apply_wrenches
 
-    monkeypatch.setattr(apply_wrench, "world_wrench", unturned)
+    def unturned(wrench_map: np.ndarray, states: np.ndarray, *rest: Any) -> None:
+        honest(wrench_map, np.tile([0.0, 0, 0, 1, 0, 0, 0], (len(states), 1)), *rest)
+
+    monkeypatch.setattr(apply_wrench, "apply_wrenches", unturned)
     run = simulate("balance-2d", seconds=2.0)
     assert run.verdict == "fail"
 
 
 def test_the_wrench_not_applied_at_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(apply_wrench, "world_wrench", lambda wrench_map, q, wrench, out: out.fill(0.0))
+    monkeypatch.setattr(apply_wrench, "apply_wrenches", lambda *given: given[4].fill(0.0))
     run = simulate("balance-2d", seconds=1.0)
     assert {"angle_error_rms_deg", "force_mismatch_rel"} <= failed(run)
     with pytest.raises(AssertionError, match="angle_error_rms_deg"):
@@ -89,13 +93,15 @@ def test_quasi_dynamic_law_oscillates() -> None:
 
 def test_a_world_that_diverges_fails_and_takes_no_other_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """One world's wrench is blown up: its states stop being numbers, its neighbours pass."""
-    honest = apply_wrench.world_wrench
+    honest = apply_wrench.apply_wrenches
 
-    def blown(wrench_map: np.ndarray, q: np.ndarray, wrench: np.ndarray, out: np.ndarray) -> None:
-        honest(wrench_map, q, wrench, out)
+    def blown(*given: Any) -> None:
+        honest(*given)
+        *_, out, xfrc, body = given
         out[1] *= 1e300
+        xfrc[1, body] = out[1]
 
-    monkeypatch.setattr(apply_wrench, "world_wrench", blown)
+    monkeypatch.setattr(apply_wrench, "apply_wrenches", blown)
     run = simulate("balance-2d", worlds=3, seconds=1.0)
     assert run.failed_worlds.tolist() == [1]
     assert run.status[1].max() == 2

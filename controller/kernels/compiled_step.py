@@ -66,7 +66,7 @@ def state_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ig
 
 @kernel
 def step_worlds(  # type: ignore[no-untyped-def]
-    belief, bounds, own, planar, several, tolerance, states, desired, external, out
+    belief, bounds, own, planar, several, tolerance, states, desired, external, out, status
 ):  # fmt: skip
     """State, solve and certify the problem of every world.
 
@@ -76,23 +76,25 @@ def step_worlds(  # type: ignore[no-untyped-def]
             where that needs more than `HEAVIEST` times the weight, or a second bound, the answer is that without any.
         own, planar, several: `WrenchController.workspace()`.
         tolerance: largest relative KKT residual of status 0 (solved).
-        states: (W, 13) as measured; of each its orientation and its angular velocity count, see `STATE`.
-        desired: orientations (W, 4), angular velocities and accelerations (W, 3) of the reference now; (1, ...) is the
-            same for all worlds.
+        states: (W, 13 or more) as measured; of each its orientation and its angular velocity count, see `STATE`.
+        desired: (W, 10) orientation (4), angular velocity (3) and acceleration (3) of the reference now; (1, 10) is
+            the same for all worlds.
         external: (W, nw) or (1, nw), known wrenches on the object besides gravity, contacts and the controller's own,
             object axes.
-        out: required (W, nw), the right-hand side J f + w of the problem, `external` taken off, object axes; wrench
-            (W, nw), object axes, nan where the status is 2 (failed: no finite answer); force (W, K d), contact axes;
-            residual (W,); status (W,) int8: 0 solved, 1 inaccurate, 2 failed. They are written.
+        out: (W, 2 nw + K d + 1), written: required (nw), the right-hand side J f + w of the problem, `external` taken
+            off, object axes; wrench (nw), object axes, nan where the status is 2 (failed: no finite answer); force
+            (K d), contact axes; residual.
+        status: (W,) int8, written: 0 solved, 1 inaccurate, 2 failed.
     """
-    belief, (q_d, omega_d, alpha_d) = Belief(*belief), desired
-    required, wrench, force, residual, status = out
+    belief = Belief(*belief)
     nw = belief.wrench_map.shape[0]
+    last = out.shape[1] - 1
     R, J, heavier, root = own
     Q_w, Q_f, mu, f_min = belief.Q_w, belief.Q_f, belief.mu, belief.f_min  # taken out once: it shows in the plane
     for i in range(states.shape[0]):
-        j, b = i % q_d.shape[0], required[i]
-        state_problem(belief, states[i, 3:7], states[i, 10:13], q_d[j], omega_d[j], alpha_d[j], R, J, b)
+        j, b, wrench, force = i % desired.shape[0], out[i, :nw], out[i, nw : 2 * nw], out[i, 2 * nw : last]
+        q, omega = states[i, 3:7], states[i, 10:13]
+        state_problem(belief, q, omega, desired[j, :4], desired[j, 4:7], desired[j, 7:10], R, J, b)
         for row in range(nw):
             b[row] -= external[i % external.shape[0], row]
         ball, multiplier, Q = -1, 0.0, Q_w
@@ -102,48 +104,63 @@ def step_worlds(  # type: ignore[no-untyped-def]
                 Q = heavier
             # Of what is None the compiler leaves the branch out, and all kernels that it calls.
             if planar is not None:
-                residual[i] = planar_wrench(J, b, Q, Q_f, mu, f_min, force[i], wrench[i], planar)
+                residual = planar_wrench(J, b, Q, Q_f, mu, f_min, force, wrench, planar)
             if several is not None:
-                residual[i] = contact_wrench(J, b, Q, Q_f, mu, f_min, force[i], wrench[i], several)
+                residual = contact_wrench(J, b, Q, Q_f, mu, f_min, force, wrench, several)
             if bounds is None:
                 break
             if attempt == 0:
-                ball = farthest_exceeded(Stacked(*bounds), wrench[i])
+                ball = farthest_exceeded(Stacked(*bounds), wrench)
                 if ball >= 0:
                     begin_multiplier(Stacked(*bounds), ball, Q_w, root)
-            if ball < 0 or not np.isfinite(residual[i]):
+            if ball < 0 or not np.isfinite(residual):
                 break
-            size = size_over(Stacked(*bounds), ball, wrench[i], wrench[i], 1.0)
+            size = size_over(Stacked(*bounds), ball, wrench, wrench, 1.0)
             if abs(size - 1.0) <= HELD:
-                residual[i] = max(residual[i], abs(size - 1.0))
+                residual = max(residual, abs(size - 1.0))
                 break
             next_multiplier(root, size)
             multiplier = root[0]
             if attempt >= ATTEMPTS - 1 or not multiplier <= HEAVIEST * root[5]:  # out of reach: as without bounds
                 ball = -1
-        if not np.isfinite(residual[i]):
+        out[i, last] = residual
+        if not np.isfinite(residual):
             status[i] = FAILED
             for row in range(nw):
-                wrench[i, row] = np.nan
+                wrench[row] = np.nan
         else:
-            status[i] = SOLVED if residual[i] <= tolerance else INACCURATE
+            status[i] = SOLVED if residual <= tolerance else INACCURATE
 
 
 @kernel
 def world_wrench(wrench_map, q, wrench, out):  # type: ignore[no-untyped-def]
-    """Turn wrenches in object axes into (force, torque) at the CoM in WORLD axes, as `xfrc_applied` wants them.
+    """Turn a wrench in object axes into (force, torque) at the CoM in WORLD axes, as `xfrc_applied` wants them.
 
     Args:
-        wrench_map: (nw, 6), see `Space`.  q: (W, 4) object to world.  wrench: (W, nw).
-        out: (W, 6), written; zero where the wrench is not finite: without an answer nothing is applied.
+        wrench_map: (nw, 6), see `Space`.  q: (4,) object to world.  wrench: (nw,).
+        out: (6,), written; zero where the wrench is not finite: without an answer nothing is applied.
     """
-    for i in range(q.shape[0]):
-        for half in (0, 3):
-            a = b = c = 0.0
-            for j in range(wrench.shape[1]):
-                a += wrench_map[j, half] * wrench[i, j]
-                b += wrench_map[j, half + 1] * wrench[i, j]
-                c += wrench_map[j, half + 2] * wrench[i, j]
-            a, b, c = turned(q[i, 0], q[i, 1], q[i, 2], q[i, 3], a, b, c)
-            finite = np.isfinite(a + b + c)
-            out[i, half], out[i, half + 1], out[i, half + 2] = (a, b, c) if finite else (0.0, 0.0, 0.0)
+    for half in (0, 3):
+        a = b = c = 0.0
+        for j in range(wrench_map.shape[0]):
+            a += wrench_map[j, half] * wrench[j]
+            b += wrench_map[j, half + 1] * wrench[j]
+            c += wrench_map[j, half + 2] * wrench[j]
+        a, b, c = turned(q[0], q[1], q[2], q[3], a, b, c)
+        finite = np.isfinite(a + b + c)
+        out[half], out[half + 1], out[half + 2] = (a, b, c) if finite else (0.0, 0.0, 0.0)
+
+
+@kernel
+def apply_wrenches(wrench_map, states, wrenches, first, out, xfrc, body):  # type: ignore[no-untyped-def]
+    """Write the wrenches of W worlds, turned as by `world_wrench`, to the log and to MuJoCo.
+
+    Args:
+        states: (W, 13 or more), see `STATE`.
+        wrenches: (W, at least nw), in the nw columns from `first` on.
+        out: (W, 6) and xfrc: (W, bodies, 6), in the row `body`: written.
+    """
+    for i in range(out.shape[0]):
+        world_wrench(wrench_map, states[i, 3:7], wrenches[i, first : first + wrench_map.shape[0]], out[i])
+        for j in range(6):
+            xfrc[i, body, j] = out[i, j]

@@ -3,7 +3,7 @@
 import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
-from pivoting.controller.kernels.compiled_step import world_wrench
+from pivoting.controller.kernels.compiled_step import apply_wrenches
 from pivoting.sim.pipeline.stages import States
 
 Array = NDArray[np.float64]
@@ -18,13 +18,13 @@ class FreeWrench:
     """
 
     def __init__(self, batch: Batch, wrench_map: Array, body: int):
-        self._map, self._xfrc = wrench_map, batch.bind("xfrc_applied")[:, body]
+        self._map, self._xfrc, self._body = wrench_map, batch.bind("xfrc_applied"), body
 
-    def __call__(self, states: States, wrench: Array, out: Array) -> None:
-        """Apply wrenches (W, nw), object axes; zero where there is no answer.
+    def __call__(self, states: States, wrenches: Array, first: int, out: Array) -> None:
+        """Apply wrenches, object axes; zero where there is no answer.
 
         Args:
+            wrenches: (W, at least nw), in the nw columns from `first` on.
             out: (W, 6), written: what is applied, force and torque at the centre of mass, world axes.
         """
-        world_wrench(self._map, states.orientation, wrench, out)
-        self._xfrc[:] = out
+        apply_wrenches(self._map, states.values, wrenches, first, out, self._xfrc, self._body)

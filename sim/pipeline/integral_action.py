@@ -37,6 +37,6 @@ class IntegralAction:
         sine = np.linalg.norm(turned[:, 1:], axis=1, keepdims=True)
         scale = 2.0 * np.arctan2(sine, turned[:, :1]) / np.where(sine > 0.0, sine, 1.0)
         self._integral += self._dt * scale * turned[:, 1:]
-        W = len(states.values)
-        orientation, velocity, acceleration = (np.broadcast_to(v, (W, v.shape[1])).copy() for v in desired)
-        return Desired(orientation, velocity, acceleration + self._gain * self._integral)
+        corrected = Desired(np.broadcast_to(desired.values, (len(states.values), desired.values.shape[1])).copy())
+        corrected.angular_acceleration[:] += self._gain * self._integral
+        return corrected

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from pivoting.controller.kernels.compiled_step import step_worlds
 from pivoting.controller.wrench_bounds import WrenchBounds
 from pivoting.controller.wrench_controller import WrenchController
-from pivoting.sim.pipeline.stages import Answers, Correct, Desired, States
+from pivoting.sim.pipeline.stages import Answers, Correct, Desired, States, stacked
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-9  # relative KKT residual of an answer that counts as solved
@@ -33,9 +33,7 @@ class LawSolver:
     def solve(self, states: States, desired: Desired, out: Answers, external: Array | None = None) -> None:
         """Write the answers on the reference as it is."""
         known = self._none if external is None else external
-        step_worlds(
-            self._belief, self._bounds, *self._work, TOLERANCE, states.values, tuple(desired), known, tuple(out)
-        )
+        step_worlds(self._belief, self._bounds, *self._work, TOLERANCE, states.values, desired.values, known, *out[:2])
 
 
 class LawControl:
@@ -48,7 +46,7 @@ class LawControl:
 
     def __init__(self, law: LawSolver, desired: tuple[Array, Array, Array], external: Array):
         self._law, self._external = law, external[:, None]
-        self._desired = [values[:, None] for values in desired]
+        self._desired = stacked(*desired)[:, None]
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
         self._law(states, self._at(k), out, self._known(k))
@@ -58,7 +56,7 @@ class LawControl:
         self._law.solve(states, self._at(0), out, self._known(0))
 
     def _at(self, k: int) -> Desired:
-        return Desired(*(values[k] for values in self._desired))
+        return Desired(self._desired[k])
 
     def _known(self, k: int) -> Array:
         return self._external[min(k, len(self._external) - 1)]

@@ -49,14 +49,11 @@ def empty_log(
     """
     nw, n = widths
     both = (steps, worlds)
-    answers = Answers(
-        np.empty((*both, nw)), np.empty((*both, nw)), np.empty((*both, n)), np.empty(both), np.empty(both, np.int8)
-    )
     return Log(
         states=np.empty((steps + 1, worlds, STATE)),
         measured=np.empty((*both, STATE)) if stages.sense else None,
         estimated=np.empty((*both, STATE)) if stages.observe else None,
-        answers=answers,
+        answers=Answers.empty(both, nw, n),
         acting=np.empty((*both, nw)) if stages.actuate else None,
         wrench_world=np.empty((*both, 6)),
         contacts=contacts[0],
@@ -74,8 +71,8 @@ def worlds_first(log: Log) -> Log:
 
 def _turned(values: Any) -> Any:
     """(step, world, ...) as the read-only view (world, step, ...), also of all arrays of a named tuple."""
-    if values is None:
-        return None
+    if values is None or isinstance(values, int):
+        return values
     if isinstance(values, tuple):
         return type(values)(*map(_turned, values))
     out = np.moveaxis(values, 1, 0)

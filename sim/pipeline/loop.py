@@ -6,6 +6,7 @@ from time import perf_counter, perf_counter_ns
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.kernels.compilation import first_calls
+from pivoting.controller.kernels.compiled_step import STATE
 from pivoting.sim.pipeline.apply_wrench import FreeWrench
 from pivoting.sim.pipeline.contact_log import BLOCK, ContactLog
 from pivoting.sim.pipeline.log import Log, empty_log, worlds_first
@@ -36,27 +37,30 @@ def run_steps(
     """
     log = empty_log(steps, plant.worlds, widths, (contacts.readings, contacts.held), stages)
     block = np.empty((max(1, min(steps, BLOCK // plant.worlds)), *plant.sensed.shape))
-    states = plant.states(log.states[0])
+    states, nw = plant.states, log.answers.nw
+    log.states[0] = plant.sensed[:, :STATE]
     with first_calls():  # compiled before it is timed
-        first_answers = Answers(*(values[0] for values in log.answers))
+        first_answers = Answers(log.answers.values[0], log.answers.status[0], nw)
         control.prepare(states, first_answers)
-        apply(states, first_answers.wrench, log.wrench_world[0])
+        apply(states, first_answers.values, nw, log.wrench_world[0])
         contacts.sort(0, log.states[:0], block[:0])
     report, first = max(1, steps // 100), 0
     start = perf_counter()
     before: Array | None = None
-    for k, answers in enumerate(map(Answers, *log.answers)):
+    for k, (values, status) in enumerate(zip(*log.answers[:2], strict=True)):
         tick = perf_counter_ns()
         seen = states if not stages.sense and not stages.observe else _seen(k, states, before, stages, log)
-        control(k, seen, before, answers)
+        control(k, seen, before, answers := Answers(values, status, nw))
         log.control_ns[k] = perf_counter_ns() - tick
         before = answers.wrench
-        apply(states, before if not stages.actuate else _acting(k, before, stages, log), log.wrench_world[k])
+        acting, column = (values, nw) if not stages.actuate else (_acting(k, before, stages, log), 0)
+        apply(states, acting, column, log.wrench_world[k])
         plant.step()
-        states = plant.states(log.states[k + 1])
         block[k - first] = plant.sensed
         if k + 1 - first == len(block) or k + 1 == steps:
-            contacts.sort(first, log.states[first : k + 1], block[: k + 1 - first])
+            sensed = block[: k + 1 - first]
+            log.states[first + 1 : k + 2] = sensed[..., :STATE]
+            contacts.sort(first, log.states[first : k + 1], sensed)
             first = k + 1
         if progress is not None and (k + 1) % report == 0:
             progress(k + 1, steps)
@@ -65,6 +69,7 @@ def run_steps(
 
 def _seen(k: int, states: States, before: Array | None, stages: Stages, log: Log) -> States:
     """What the control is told of the states: as they are measured and estimated."""
+    states = states.copy()
     for sense in stages.sense:
         states = sense(k, states)
     if log.measured is not None:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pivoting.controller.solution import FAILED, UNCERTIFIED
 from pivoting.controller.validate import fail
-from pivoting.sim.pipeline.stages import Answers, Desired, States
+from pivoting.sim.pipeline.stages import Answers, Desired, States, stacked
 
 Array = NDArray[np.float64]
 
@@ -43,14 +43,14 @@ class OwnControl:
         if not callable(function):
             raise fail("control", function, "a function of a Moment that gives the wrench")
         self._function, self._dt = function, dt
-        self._desired = [values[:, None] for values in desired]
+        self._desired = stacked(*desired)[:, None]
 
     def prepare(self, states: States, out: Answers) -> None:
         """Nothing has to be done; the function is not asked before its time."""
         out.wrench[:] = 0.0
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
-        now = Moment(k * self._dt, states, Desired(*(values[k] for values in self._desired)), before)
+        now = Moment(k * self._dt, states.copy(), Desired(self._desired[k]), before)
         given = np.asarray(self._function(now))
         W, nw = out.wrench.shape
         if given.dtype.kind not in "iuf" or given.shape not in ((W, nw), (nw,)):

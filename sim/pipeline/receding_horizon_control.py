@@ -8,7 +8,7 @@ from pivoting.controller.planning.receding_horizon import OUTCOMES, Followed, Re
 from pivoting.sim.pipeline.bounded_control import applied
 from pivoting.sim.pipeline.law_control import LawSolver
 from pivoting.sim.pipeline.plan_log import Event, PlanLog
-from pivoting.sim.pipeline.stages import Answers, Desired, States
+from pivoting.sim.pipeline.stages import Answers, Desired, States, stacked
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ class RecedingHorizonControl:
         self._wanted = wanted.reshape(*times.shape, 4)  # (P, N, 4) desired orientations over each plan's horizon
         self._followed: list[Followed | None] = [None] * W
         self._released: list[int] = []
-        self._motions = np.empty((every, W, 4)), np.empty((every, W, 3)), np.empty((every, W, 3))
+        self._motions = np.empty((every, W, 10))  # the values of `Desired` until the next plan
         self._times: Array = dt * np.arange(every, dtype=float)
         self.log = PlanLog(
             every * np.arange(P), np.zeros((W, P), np.int8), *(np.full((W, P), np.nan) for _ in range(5))
@@ -65,19 +65,17 @@ class RecedingHorizonControl:
         for _ in range(2):
             now = self._horizons[0].replan(state, self._wanted[0], None)
         followed_motion(now, state, self._times)
-        for values, still in zip(self._motions, (state.orientation, np.zeros(3), np.zeros(3)), strict=True):
-            values[:] = still
+        self._motions[:] = stacked(state.orientation, np.zeros(3), np.zeros(3))
         self._law.solve(states, self._desired(0), out)
 
     def _desired(self, k: int) -> Desired:
-        return Desired(*(values[k % self._every] for values in self._motions))
+        return Desired(self._motions[k % self._every])
 
     def _follow(self, k: int, states: States, out: Answers) -> None:
         """The per-step law; nothing, where the object was let go."""
         self._law(states, self._desired(k), out)
         for i in self._released:
-            for values in out:
-                values[i] = 0
+            out.values[i] = out.status[i] = 0
 
     def _plan(self, i: int, k: int, states: States, applied: Array | None) -> None:
         state = body_state(states, i)
@@ -91,8 +89,7 @@ class RecedingHorizonControl:
             return
         if now.outcome == "released":
             self._released.append(i)
-        for values, motion in zip(self._motions, followed_motion(now, state, self._times), strict=True):
-            values[:, i] = motion
+        self._motions[:, i] = stacked(*followed_motion(now, state, self._times))
         tried = now.attempt
         change = tried.changes[-1] if tried.changes else np.nan
         self.log.residual[i, p], self.log.change[i, p], self.log.ms[i, p] = tried.residual, change, 1e3 * tried.seconds

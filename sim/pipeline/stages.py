@@ -24,7 +24,8 @@ class States:
     """The states of W worlds at one time.
 
     Attributes:
-        values: (W, 13) position, orientation, velocity and angular velocity, in this order, as the properties say.
+        values: (W, 13) position, orientation, velocity and angular velocity, in this order, as the properties say;
+            more columns may follow, which are no part of the state.
         joint_position: (W, nq) and joint_velocity: (W, nv) of all joints of the model.
     """
 
@@ -53,6 +54,10 @@ class States:
         """(W, 3) world axes [rad/s]."""
         return self.values[:, ANGULAR_VELOCITY]
 
+    def copy(self) -> "States":
+        """The same in arrays of their own, for whoever may keep them: those of the plant change with every step."""
+        return States(self.values[:, :STATE].copy(), self.joint_position.copy(), self.joint_velocity.copy())
+
     def changed(self, values: Array) -> "States":
         """The same joints with other values (W, 13) of the object, as something measures or estimates it."""
         return States(values, self.joint_position, self.joint_velocity)
@@ -66,28 +71,72 @@ class States:
 
 
 class Answers(NamedTuple):
-    """Where a control writes its answers to one step.
+    """Where a control writes its answers to one step; of a whole run, leading axes of worlds and steps.
 
     Attributes:
-        required: (W, nw) what the contact forces and the wrench have to make together, object axes [N, N m].
-        wrench: (W, nw) that is to be applied, object axes; nan where there is no answer.
-        force: (W, K d) contact forces that go with it, contact axes [N].
-        residual: (W,) relative KKT residuals.  status: (W,) codes of `solution.STATUS`.
+        values: (W, 2 nw + K d + 1) the columns of `required`, `wrench`, `force` and `residual`, in this order.
+        status: (W,) codes of `solution.STATUS`.
+        nw: numbers of a wrench, 3 in the plane and 6 in space.
     """
 
-    required: Array
-    wrench: Array
-    force: Array
-    residual: Array
+    values: Array
     status: NDArray[np.int8]
+    nw: int
+
+    @property
+    def required(self) -> Array:
+        """(W, nw) what the contact forces and the wrench have to make together, object axes [N, N m]."""
+        return self.values[..., : self.nw]
+
+    @property
+    def wrench(self) -> Array:
+        """(W, nw) that is to be applied, object axes [N, N m]; nan where there is no answer."""
+        return self.values[..., self.nw : 2 * self.nw]
+
+    @property
+    def force(self) -> Array:
+        """(W, K d) contact forces that go with it, contact axes [N]."""
+        return self.values[..., 2 * self.nw : -1]
+
+    @property
+    def residual(self) -> Array:
+        """(W,) relative KKT residuals."""
+        return self.values[..., -1]
+
+    @classmethod
+    def empty(cls, shape: tuple[int, ...], nw: int, forces: int) -> "Answers":
+        """Without values yet, of worlds, or of steps and worlds, of this shape, with K d = `forces`."""
+        return cls(np.empty((*shape, 2 * nw + forces + 1)), np.empty(shape, np.int8), nw)
 
 
 class Desired(NamedTuple):
-    """Where the object is to be: orientation (W or 1, 4), angular velocity and acceleration (W or 1, 3), world axes."""
+    """Where the object is to be.
 
-    orientation: Array
-    angular_velocity: Array
-    angular_acceleration: Array
+    Attributes:
+        values: (W or 1, 10) the columns of the properties, in their order.
+    """
+
+    values: Array
+
+    @property
+    def orientation(self) -> Array:
+        """(W or 1, 4) quaternions, object axes to world."""
+        return self.values[..., :4]
+
+    @property
+    def angular_velocity(self) -> Array:
+        """(W or 1, 3) world axes [rad/s]."""
+        return self.values[..., 4:7]
+
+    @property
+    def angular_acceleration(self) -> Array:
+        """(W or 1, 3) world axes [rad/s^2]."""
+        return self.values[..., 7:]
+
+
+def stacked(orientation: Array, angular_velocity: Array, angular_acceleration: Array) -> Array:
+    """The values (..., 10) of `Desired` out of (..., 4), (..., 3) and (..., 3)."""
+    return np.concatenate([orientation, angular_velocity, angular_acceleration], axis=-1)
 
 
 class Sense(Protocol):
