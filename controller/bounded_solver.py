@@ -57,10 +57,10 @@ class BoundedSolver:
         belief, dim = controller.belief, controller.space.dim
         self._controller, self._belief = controller, belief
         self._unit, self._scale = controller.units.force, controller.units.wrench
-        nw, n = len(belief.Q_w), len(belief.Q_f)
-        self._axes = free_axes(belief.points, belief.pivot, belief.wrench_map)
+        nw, n = len(belief.source.Q_w), len(belief.contacts.Q_f)
+        self._axes = free_axes(belief.contacts.points, belief.contacts.pivot, belief.source.map)
         A = len(self._axes)
-        own = friction_limits(belief.mu, belief.f_min / self._unit, dim)
+        own = friction_limits(belief.contacts.mu, belief.contacts.f_min / self._unit, dim)
         bound = self._bounds = wrench_limits(bounds, nw, 0, self._scale, dt)
         wide = n + nw + A + nw + 2
         f, w, a, s, t_a, t_s = np.split(np.arange(wide), np.cumsum([n, nw, A, nw, 1]))
@@ -94,8 +94,8 @@ class BoundedSolver:
             ],
         )
         P = np.zeros((wide, wide))
-        P[np.ix_(f, f)] = belief.Q_f
-        P[np.ix_(w, w)] = self._scale[:, None] * belief.Q_w * self._scale / self._unit**2
+        P[np.ix_(f, f)] = belief.contacts.Q_f
+        P[np.ix_(w, w)] = self._scale[:, None] * belief.source.Q_w * self._scale / self._unit**2
         P, every = np.triu(P), np.arange(wide)[None]
         self._P = BlockMatrix((wide, wide), [Part(every, every, P != 0.0, P)]).filled(())
         self._q = np.zeros(wide)
@@ -110,7 +110,7 @@ class BoundedSolver:
             required: (nw,) see `WrenchProblem`.
             before: (nw,) wrench applied until now, for bounds on the rate; None: not known.
         """
-        nw, n = len(self._scale), len(self._belief.Q_f)
+        nw, n = len(self._scale), len(self._belief.contacts.Q_f)
         jacobian = self._controller.jacobian(orientation)
         scaled = jacobian * self._unit / self._scale[:, None]
         b = self._sides.copy()
@@ -127,7 +127,7 @@ class BoundedSolver:
             wrench = required - jacobian @ force
             lacking = np.zeros(nw)
         return BoundedWrench(
-            wrench, force.reshape(len(self._belief.mu), -1), lacking, answer.residual, exact
+            wrench, force.reshape(len(self._belief.contacts.mu), -1), lacking, answer.residual, exact
         )  # fmt: skip
 
 
@@ -138,7 +138,7 @@ def _fill_turning(axes, q, belief, scale, R, out):  # type: ignore[no-untyped-de
     Args:
         axes: (A, 3) object axes.  q: (4,) object axes to world.  R: (3, 3) scratch.
     """
-    p, o, inertia = belief.pivot, belief.offset, belief.inertia
+    p, o, inertia = belief.contacts.pivot, belief.contacts.offset, belief.object.inertia
     fill_rotation(q, R)
     o0, o1, o2 = into(R, o[0], o[1], o[2])
     most = 1e-300
@@ -148,9 +148,9 @@ def _fill_turning(axes, q, belief, scale, R, out):  # type: ignore[no-untyped-de
         M0 = -(inertia[0, 0] * a0 + inertia[0, 1] * a1 + inertia[0, 2] * a2)
         M1 = -(inertia[1, 0] * a0 + inertia[1, 1] * a1 + inertia[1, 2] * a2)
         M2 = -(inertia[2, 0] * a0 + inertia[2, 1] * a1 + inertia[2, 2] * a2)
-        m = belief.mass
+        m = belief.object.mass
         for row in range(out.shape[0]):
-            out[row, j] = component(belief.wrench_map, row, m * F0, m * F1, m * F2, M0, M1, M2) / scale[row]
+            out[row, j] = component(belief.source.map, row, m * F0, m * F1, m * F2, M0, M1, M2) / scale[row]
             most = max(most, abs(out[row, j]))
     for row in range(out.shape[0]):
         for j in range(out.shape[1]):

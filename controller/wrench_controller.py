@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pivoting.controller.belief import Belief, BelievedObject, HeldContacts, WrenchSource
 from pivoting.controller.contacts import Contact
 from pivoting.controller.control_laws import Body, Law
-from pivoting.controller.kernels.compiled_step import Belief, state_problem
+from pivoting.controller.kernels.compiled_step import state_problem
 from pivoting.controller.kernels.workspace import workspace
 from pivoting.controller.motion import Motion
 from pivoting.controller.plane_and_space import Space, space
@@ -94,29 +95,27 @@ class WrenchController:
         points = np.array([here.lift(contact.point) for contact in self.contacts])
         frames = np.array([_lifted_frame(contact, here, table) for contact in self.contacts])
         offsets = -frames[:, :, 2] * np.array([[contact.radius] for contact in self.contacts])
-        return Belief(
+        held = HeldContacts(
             points=points,
             offsets=offsets,
             frames=frames,
+            turning=np.array([contact.fixed_to == "object" for contact in self.contacts]),
             pivot=points.mean(axis=0),
             offset=offsets.mean(axis=0),
             mu=np.array([(1.0 - self.margin) * contact.mu for contact in self.contacts]),
             f_min=np.array([contact.f_min for contact in self.contacts]),
-            mass=float(self.body.mass),
-            inertia=here.lift_inertia(self.body.inertia),
-            gravity=self.gravity if self.gravity.size == 3 else here.lift(self.gravity),
-            law=self.law.coefficients,
-            Q_w=np.array(self.Q_w),
-            Q_f=np.array(self.Q_f),
-            wrench_map=here.wrench_map,
             force_map=np.ascontiguousarray(here.force_map),
+            Q_f=np.array(self.Q_f),
         )
+        gravity = self.gravity if self.gravity.size == 3 else here.lift(self.gravity)
+        moved = BelievedObject(float(self.body.mass), here.lift_inertia(self.body.inertia), gravity)
+        return Belief(moved, held, WrenchSource(here.wrench_map, np.array(self.Q_w)), self.law.coefficients)
 
     @cached_property
     def units(self) -> Units:
         """In which its programs are stated."""
         belief = self.belief
-        return units(belief.mass, belief.gravity, belief.points, self.space.dim)
+        return units(belief.object.mass, belief.object.gravity, belief.contacts.points, self.space.dim)
 
     @property
     def widths(self) -> tuple[int, int]:
@@ -153,7 +152,7 @@ class WrenchController:
             J,
             required,
             [contact.mu for contact in self.contacts],
-            f_min=self.belief.f_min,
+            f_min=self.belief.contacts.f_min,
             margin=self.margin,
             Q_w=self.Q_w,
             Q_f=self.Q_f,

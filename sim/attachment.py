@@ -96,7 +96,7 @@ class Attached:
         """
         answer = self.solution(data, reference)
         out = np.empty(6)
-        world_wrench(self.controller.belief.wrench_map, self._orientation(data), answer.wrench, out)
+        world_wrench(self.controller.belief.source.map, self._orientation(data), answer.wrench, out)
         return out
 
 

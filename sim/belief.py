@@ -1,5 +1,6 @@
 """What the controller believes of a scenario: the object, where it is placed, and the controller made for them."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,18 +17,25 @@ from pivoting.sim.scenarios.scenario_keys import CONTROL_KEYS
 
 
 class Believed(NamedTuple):
-    """scene: as the controller knows it.  attached: the controller on it.  placement: of the object there."""
+    """scene: as the controller knows it.  attached: the controller on it.  placement: of the object there.
+
+    controllers: one for each world, or one that they share; the first is that of `attached`.
+    """
 
     scene: Scene
     attached: Attached
     placement: Placement
+    controllers: tuple[WrenchController, ...]
 
 
-def believe(case: Scenario, read: Scene, controller: WrenchController | None = None) -> Believed:
-    """What the scenario's controller, or another, believes.
+def believe(
+    case: Scenario, read: Scene, worlds: int = 1, given: WrenchController | Sequence[WrenchController] | None = None
+) -> Believed:
+    """What the scenario's controller, or others, believe.
 
     Args:
         read: the scene of the scenario's file.
+        given: in place of the scenario's own controller another, or one for each of the worlds.
 
     Raises:
         ModelError: the object cannot be served, or placed on its contact.
@@ -38,13 +46,15 @@ def believe(case: Scenario, read: Scene, controller: WrenchController | None = N
     there = placed(case, scene.compiled, read.unit)
     if case.chosen and case.mu is None:  # what the file itself says of friction holds: it may have none
         read_friction(read.read, body_id(read.read, read.body), geom_id(read.read, read.support), there.contacts)
-    if controller is not None:
+    controllers = _given(given, worlds)
+    for controller in controllers:
         _check(controller, case, there)
-    floor = (case.f_min or 0.0) if controller is None else controller.belief.f_min.max()
+    floors = [controller.belief.contacts.f_min.max() for controller in controllers]
+    floor = min(floors, default=case.f_min or 0.0)
     if there.load.force == 0.0 and floor == 0.0:
         raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the object on its support")
-    if controller is not None:
-        return Believed(scene, Attached(scene.compiled, there.body, controller), there)
+    if controllers:
+        return Believed(scene, Attached(scene.compiled, there.body, controllers[0]), there, controllers)
     attached = attach(
         scene.compiled,
         body=case.body,
@@ -57,7 +67,18 @@ def believe(case: Scenario, read: Scene, controller: WrenchController | None = N
         Q_w=case.wrench_weight(there.body.dim, read.unit),
         support=case.support,
     )
-    return Believed(scene, attached, there)
+    return Believed(scene, attached, there, (attached.controller,))
+
+
+def _given(given: WrenchController | Sequence[WrenchController] | None, worlds: int) -> tuple[WrenchController, ...]:
+    """The controllers that were given; none, where the scenario's own is to be made."""
+    if given is None:
+        return ()
+    if not isinstance(given, Sequence):
+        return (given,)
+    if len(given) != worlds:
+        raise fail("controller", f"{len(given)} of them", f"one, or one for each of the {worlds} worlds")
+    return tuple(given)
 
 
 def _floor(case: Scenario, there: Placement) -> float:

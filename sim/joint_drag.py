@@ -29,9 +29,9 @@ def drag_wrench(
     belief, drag = controller.belief, body.drag
     axes = matrix(body.axes)
     anchor = axes.T @ (drag.anchor - body.com)  # object axes
-    turned = rotated(q, anchor - belief.pivot)
-    ahead = np.cross(bend, turned - belief.offset) + np.cross(w, np.cross(w, turned))  # of what rolls, too
-    velocity = np.cross(w, turned - belief.offset)
+    turned = rotated(q, anchor - belief.contacts.pivot)
+    ahead = np.cross(bend, turned - belief.contacts.offset) + np.cross(w, np.cross(w, turned))  # of what rolls, too
+    velocity = np.cross(w, turned - belief.contacts.offset)
 
     def resist(speed: Array, change: Array, dofs: slice) -> Array:
         dry = (drag.rate[dofs] * speed + change) / drag.give[dofs]
@@ -47,4 +47,4 @@ def drag_wrench(
         force = resist(velocity, ahead, slice(0, 3))
         moment = resist(rotated(q * CONJUGATE, w), rotated(q * CONJUGATE, bend), slice(3, 6))
     local = rotated(q * CONJUGATE, force)
-    return np.concatenate([local, moment + np.cross(anchor, local)], axis=1) @ belief.wrench_map.T
+    return np.concatenate([local, moment + np.cross(anchor, local)], axis=1) @ belief.source.map.T

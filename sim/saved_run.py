@@ -135,7 +135,9 @@ def _restored(begun: Begun, arrays: Arrays, outcome: Mapping[str, Any], python_o
     if (found := plan_of(arrays)) is not None:
         desired, guess = found
         figures = {**outcome["plan"], "changes": tuple(outcome["plan"]["changes"])}
-        program = HorizonProgram(scenario_horizon(begun.case, begun.belief, steps=len(guess.wrench)))
+        program = HorizonProgram(
+            scenario_horizon(begun.case, begun.belief, begun.belief.attached.controller, steps=len(guess.wrench))
+        )
         plan = Plan(program, desired, guess, **figures)
     for values in arrays.values():
         values.flags.writeable = False

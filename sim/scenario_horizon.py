@@ -8,6 +8,7 @@ from pivoting.controller.planning.receding_horizon import RecedingHorizon
 from pivoting.controller.planning.sequential_convex import Planner
 from pivoting.controller.rotations import exponential, quaternion_product
 from pivoting.controller.validate import fail
+from pivoting.controller.wrench_controller import WrenchController
 from pivoting.models.frames import matrix
 from pivoting.models.placement.contact_candidates import contact_points
 from pivoting.sim.belief import Believed
@@ -32,12 +33,13 @@ def receding_horizon_control(
     assert case.plan_hz is not None
     every = round(1.0 / (case.plan_hz * dt))
     whole = abs(every * dt * case.plan_hz - 1.0) < 1e-6
-    horizon = scenario_horizon(case, belief)
+    planned = [scenario_horizon(case, belief, controller) for controller in belief.controllers]
+    horizon = planned[0]
     if not whole or every < 1 or every * dt > horizon.steps * horizon.h:
         longest = f"{horizon.steps * horizon.h:g} s"
         allowed = f"such that a plan is made every {dt:g} s (the time step) to {longest}, in whole time steps"
         raise fail("plan_hz", case.plan_hz, allowed)
-    horizons = [RecedingHorizon(Planner(horizon), every * dt) for _ in range(worlds)]
+    horizons = [RecedingHorizon(Planner(planned[i % len(planned)]), every * dt) for i in range(worlds)]
     return RecedingHorizonControl(horizons, law, reference, dt, every, steps)
 
 
@@ -50,13 +52,14 @@ def plan_playback(case: Scenario, belief: Believed, reference: Turn, dt: float, 
     if per > 1 and (case.force_rate is not None or case.moment_rate is not None):
         allowed = f"the time step, {dt:g} s, with a bound on a rate: between two steps of a plan its wrench jumps"
         raise fail("plan_step", case.plan_step, allowed)
-    horizon = scenario_horizon(case, belief, steps=-(-steps // per))
+    horizon = scenario_horizon(case, belief, belief.attached.controller, steps=-(-steps // per))
     return PlanPlayback(Planner(horizon), reference, per)
 
 
-def scenario_horizon(case: Scenario, belief: Believed, steps: int | None = None) -> Horizon:
-    """The scenario's horizon; `steps` in place of its own."""
-    controller = belief.attached.controller
+def scenario_horizon(
+    case: Scenario, belief: Believed, controller: WrenchController, steps: int | None = None
+) -> Horizon:
+    """The scenario's horizon, of one of the controllers; `steps` in place of its own."""
     return Horizon(
         controller,
         int(case.plan_steps) if steps is None else steps,

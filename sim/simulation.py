@@ -1,6 +1,6 @@
 """`simulate`: a closed-loop run, from a scenario to what is measured."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,7 +43,7 @@ def simulate(
     worlds: int = 1,
     seed: int = 0,
     *,
-    controller: WrenchController | None = None,
+    controller: WrenchController | Sequence[WrenchController] | None = None,
     control: OwnControlFunction | None = None,
     observe: Observe | None = None,
     first_world: int = 0,
@@ -58,7 +58,8 @@ def simulate(
         worlds: how many; they differ by what is drawn from `seed`: their initial angle errors, and noise if there is
             any. World i of one run is world i of any other with the same seed.
         seed: same seed, same arrays, bit for bit.
-        controller: to be tested in place of the scenario's own, which is built from what the scenario believes.
+        controller: to be tested in place of the scenario's own, which is built from what the scenario believes; or
+            one for each world, of the same law and as many contacts, that believe different things.
         control: a function of your own that decides on the wrench in place of the controller, see `OwnControl`.
         observe: a function of your own that estimates the states from what is measured, see `stages.Observe`.
         first_world: number of the first world, with which one world of a larger run is run again alone.
@@ -115,13 +116,20 @@ class _Decided(NamedTuple):
     python_objects: tuple[str, ...]
 
 
-def set_up(asked: Scenario, controller: WrenchController | None, *, worlds: int, seed: int, first_world: int) -> Begun:
+def set_up(
+    asked: Scenario,
+    controller: WrenchController | Sequence[WrenchController] | None,
+    *,
+    worlds: int,
+    seed: int,
+    first_world: int,
+) -> Begun:
     """The world and the belief of a scenario; arguments and errors as of `simulate`."""
     for key, value, least in (("worlds", worlds, 1), ("seed", seed, 0), ("first_world", first_world, 0)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
             raise fail(key, value, f"a whole number >= {least}")
     scene = load(asked.path, body=asked.body, support=asked.support, chosen=asked.chosen)
-    belief = believe(asked, scene, controller)
+    belief = believe(asked, scene, int(worlds), controller)
     case = asked.absolute(belief.placement.load)
     world = build_world(case, belief.scene, scene, belief.placement)
     time = _times(case, world.dt, int(worlds))
@@ -139,13 +147,14 @@ def set_up(asked: Scenario, controller: WrenchController | None, *, worlds: int,
 
 def _control(begun: Begun, own: OwnControlFunction | None, observe: Observe | None, open_loop: bool) -> _Decided:
     """The scenario's control, or the user's own, and the stages around it."""
-    case, (_, attached, there) = begun.case, begun.belief
+    case, (_, attached, there, controllers) = begun.case, begun.belief
     stages = build_stages(case.stages, begun.setting)
     if observe is not None:
         stages = stages._replace(observe=(*stages.observe, observe))
     bounds, dt = case.bounds(there.unit), begun.world.dt
-    law = LawSolver(attached.controller, bounds, stages.correct)
-    per_step = LawControl(law, begun.told, drag_wrench(attached.body, attached.controller, *begun.told))
+    law = LawSolver(controllers, bounds, stages.correct)
+    drag = np.stack([drag_wrench(attached.body, controller, *begun.told) for controller in controllers], axis=1)
+    per_step = LawControl(law, begun.told, drag)
     handed = {"controller": begun.given, "control": own is not None, "observe": observe is not None}
     objects = tuple(name for name, there_is in handed.items() if there_is)
     if own is not None:
@@ -154,12 +163,14 @@ def _control(begun: Begun, own: OwnControlFunction | None, observe: Observe | No
         raise ModelError(f"body = {attached.body.name!r}: a plan knows no joint damping or friction; must have none")
     control: Control = per_step
     if open_loop:
+        if len(controllers) > 1:
+            raise fail("controller", f"{len(controllers)} of them", "one in open loop, where one plan is played")
         control = plan_playback(case, begun.belief, begun.follow, dt, begun.steps)
     elif case.plan_hz is not None:
         worlds = begun.setting.worlds
         control = receding_horizon_control(case, begun.belief, law, begun.follow, worlds, dt, begun.steps)
     if bounds.any and not open_loop:  # a plan is within them
-        control = BoundedControl(control, attached.controller, bounds, dt)
+        control = BoundedControl(control, controllers, bounds, dt)
     return _Decided(control, per_step, stages, objects)
 
 
@@ -174,7 +185,7 @@ def _run(begun: Begun, decided: _Decided, progress: Callable[[int, int], None] |
     start = np.array(batch.bind("qpos")), np.array(batch.bind("qvel"))
     for values in start:
         values.flags.writeable = False
-    table, wrench_map = matrix(world.truth.table), attached.controller.belief.wrench_map
+    table, wrench_map = matrix(world.truth.table), attached.controller.belief.source.map
     contacts = ContactLog(world.declared, world.contact_rows, table, world.sensors, begun.steps, worlds)
     apply, widths = FreeWrench(batch, wrench_map, world.truth.index), attached.controller.widths
     with engine_log() as warned:

@@ -6,6 +6,7 @@ import cvxpy as cp
 import numpy as np
 import pytest
 from pivoting.controller import Body, Contact, Law, Motion, WrenchBounds, WrenchController, solve
+from pivoting.controller.belief import for_worlds
 from pivoting.controller.bounded_solver import BREAK, GIVE_UP, BoundedSolver
 from pivoting.controller.kernels.compiled_step import step_worlds
 from pivoting.controller.solvers.clarabel_backend import POOR, ClarabelWithRetry
@@ -60,21 +61,21 @@ def test_another_modelling_layer_agrees(controller: WrenchController, kind: str,
     dim, nw, n = controller.space.dim, *J.shape
     before = np.linspace(-0.4, 0.4, nw)
     answer = BoundedSolver(controller, bounds, dt)(q, required, before)
-    weight, lever = controller.body.mass * G, np.linalg.norm(controller.belief.pivot)
+    weight, lever = controller.body.mass * G, np.linalg.norm(controller.belief.contacts.pivot)
     unit = weight * np.array([1.0] * dim + [lever] * (nw - dim))
     f, w, s = cp.Variable(n), cp.Variable(nw), cp.Variable(nw)
     # of a turn about the contacts: everywhere about a vertex, about the edge, in the plane
     axes = {"plane": [[0.0, -1.0, 0.0]], "edge": [[0.0, 1.0, 0.0]], "vertex": np.eye(3)}[kind]
-    arm, inertia = -controller.belief.pivot, controller.belief.inertia
+    arm, inertia = -controller.belief.contacts.pivot, controller.belief.object.inertia
     moves = [np.r_[controller.body.mass * np.cross(e, arm), inertia @ np.asarray(e, dtype=float)] for e in axes]
-    B = controller.belief.wrench_map @ np.array(moves).T / unit[:, None]
+    B = controller.belief.source.map @ np.array(moves).T / unit[:, None]
     B /= np.abs(B).max()
     a = cp.Variable(B.shape[1])
     limits = [(J @ f * weight + cp.multiply(unit, w - B @ a - s) - required) / unit == 0]
     for i, contact in enumerate(controller.contacts):
         own = f[dim * i : dim * (i + 1)]
         limits += [own[-1] >= contact.f_min / weight]
-        limits += [cp.norm(own[:-1]) <= controller.belief.mu[i] * own[-1]]
+        limits += [cp.norm(own[:-1]) <= controller.belief.contacts.mu[i] * own[-1]]
     F, M = weight * w[:dim], weight * lever * w[dim:]
     for value, most in ((F, bounds.force), (M, bounds.moment)):
         limits += [cp.norm(value) <= most] if np.isfinite(most) else []
@@ -111,7 +112,7 @@ def test_what_is_given_up_is_a_turn_about_the_contact_where_that_is_enough() -> 
     q, _, required = stated(controller, np.deg2rad(40.0))
     answer = BoundedSolver(controller, WrenchBounds(force=0.3, moment=0.1), 1e-3)(q, required)
     assert not answer.exact
-    turn = np.r_[np.cross([0.0, -1.0, 0.0], -controller.belief.pivot)[[0, 2]], 1.0 / 6.0]
+    turn = np.r_[np.cross([0.0, -1.0, 0.0], -controller.belief.contacts.pivot)[[0, 2]], 1.0 / 6.0]
     np.testing.assert_allclose(answer.lacking, answer.lacking[2] / turn[2] * turn, atol=1e-6)
 
 
@@ -177,7 +178,7 @@ def test_a_bound_is_a_heavier_weight(controller: WrenchController, kind: str) ->
     """
     rng, still, held, left = np.random.default_rng(5), np.zeros((1, 3)), 0, 0
     nw, n, dim = len(controller.Q_w), len(controller.Q_f), controller.space.dim
-    belief, work, units = tuple(controller.belief), controller.workspace(), controller.units
+    belief, work, units = for_worlds([controller.belief]), controller.workspace(), controller.units
 
     def step(bounds: WrenchBounds, angle: float, wanted: float) -> tuple[np.ndarray, ...]:
         out, status = np.empty((1, 2 * nw + n + 1)), np.empty(1, np.int8)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from pivoting.controller import Body, Contact, Law, Motion, WrenchController, solve
+from pivoting.controller.belief import for_worlds
 from pivoting.controller.kernels.compiled_step import apply_wrenches, step_worlds
 from pivoting.controller.kernels.kernel_cache import drop_stale
 from scipy.spatial.transform import Rotation
@@ -51,7 +52,7 @@ def stepped(
     out, status = np.ones((W, 2 * nw + n + 1)), np.full(W, 9, np.int8)
     reference = np.concatenate(controller.space.lift_motion(desired))[None]
     known = np.zeros((1, nw)) if external is None else external
-    belief = tuple(controller.belief)
+    belief = for_worlds([controller.belief])
     step_worlds(belief, None, *controller.workspace(), tolerance, states(q, omega), reference, known, out, status)
     return Stepped(*np.split(out[:, :-1], [nw, 2 * nw], axis=1), out[:, -1], status)
 
@@ -109,7 +110,7 @@ def test_a_state_that_is_not_a_number_has_no_answer_and_applies_nothing() -> Non
     assert out.status.tolist() == [0, 2]
     assert np.isnan(out.wrench[1]).all()
     applied, xfrc = np.ones((2, 6)), np.ones((2, 3, 6))
-    apply_wrenches(BLOCK.belief.wrench_map, states(q, np.zeros((2, 3))), out.wrench.copy(), 0, applied, xfrc, 1)
+    apply_wrenches(BLOCK.belief.source.map, states(q, np.zeros((2, 3))), out.wrench.copy(), 0, applied, xfrc, 1)
     assert np.array_equal(xfrc[:, 1], applied)
     assert (xfrc[:, [0, 2]] == 1.0).all()
     assert applied[0].any()

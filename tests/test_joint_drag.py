@@ -114,7 +114,7 @@ def tilted_by_hand(damping: float, known: bool) -> float:
         else:
             answer = solve(held.controller.problem(state, target))
             q = np.asarray(state.orientation)
-            world_wrench(held.controller.belief.wrench_map, q, answer.wrench, out[0])
+            world_wrench(held.controller.belief.source.map, q, answer.wrench, out[0])
         dot = abs(float(np.asarray(state.orientation) @ np.asarray(target.orientation)))
         off = max(off, float(np.rad2deg(2.0 * np.arccos(min(dot, 1.0)))))
         data.xfrc_applied[1] = out[0]

@@ -61,7 +61,7 @@ def test_dynamic_gives_the_acceleration_it_asks_for(theta: float, omega: float) 
     data.qvel[2] = omega
     q = controller.space.orientation(theta)
     out = np.empty((1, 6))
-    world_wrench(controller.belief.wrench_map, q, wrench, out[0])
+    world_wrench(controller.belief.source.map, q, wrench, out[0])
     data.xfrc_applied[1] = out[0]
     mujoco.mj_forward(model, data)
     alpha = 4.0 + 30.0**2 * 0.05 + 2.0 * 0.7 * 30.0 * 0.3
@@ -97,7 +97,7 @@ def test_dynamic_law_in_space_with_its_gyroscopic_terms() -> None:
     mujoco.mju_quatIntegrate(q_d, tip, 1.0)
     wrench = controller.problem(Motion(q, omega), Motion(q_d, omega_d, alpha_d)).required
     out = np.empty((1, 6))
-    world_wrench(controller.belief.wrench_map, q, wrench, out[0])
+    world_wrench(controller.belief.source.map, q, wrench, out[0])
     R = np.empty(9)
     mujoco.mju_quat2Mat(R, q)
     R = R.reshape(3, 3)

@@ -327,7 +327,10 @@ def test_in_space(name: str, tmp_path: Path) -> None:
             assert np.array_equal(plotted[0], forces[0, :, i, 2])
             assert np.allclose(plotted[1], np.hypot(*forces[0, :, i, :2].T), rtol=1e-12)
         floor = scale * run.scenario.f_min
-        for which, mu, low in (("planned", run.attached.controller.belief.mu[i], floor), ("world", run.world.mu, 0.0)):
+        for which, mu, low in (
+            ("planned", run.attached.controller.belief.contacts.mu[i], floor),
+            ("world", run.world.mu, 0.0),
+        ):
             lines = entities[f"{entity}/cone/{which}"]["static LineStrips3D:strips"].to_pylist()[0]
             (left, apex, right), (bottom, top) = np.array(lines[0]), map(np.array, lines[-2:])
             assert apex.tolist() == [0.0, 0.0, 0.0]

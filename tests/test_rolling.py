@@ -127,7 +127,7 @@ def test_the_required_wrench_makes_a_free_body_roll(radius: float) -> None:
     q, alpha = np.roll(turned.as_quat(), 1), np.array([5.0, 1.0, -3.0])
     wrench = controller.problem(Motion(q, omega), Motion(q, omega, alpha)).required
     out = np.empty((1, 6))
-    world_wrench(controller.belief.wrench_map, q, wrench, out[0])
+    world_wrench(controller.belief.source.map, q, wrench, out[0])
     data.qpos[3:], data.qvel[3:] = q, turned.inv().apply(omega)  # a free joint's rates are in object axes
     data.qvel[:3] = -np.cross(omega, turned.apply(point) - s * n)
     data.xfrc_applied[1] = out[0]

@@ -112,7 +112,7 @@ def test_cones_are_those_that_the_controller_keeps_to(name: str, shipped: Shippe
     red = geoms(scene, ARROW, RED)
     triangles = geoms(scene, TRIANGLE, PURPLE)
     if run.truth.dim == 2:
-        assert len(triangles) == 1 + (belief.f_min[0] > 0.0)
+        assert len(triangles) == 1 + (belief.contacts.f_min[0] > 0.0)
     else:
         assert len(red) * 8 < len(triangles) < len(red) * 32
     corners = []
@@ -123,11 +123,11 @@ def test_cones_are_those_that_the_controller_keeps_to(name: str, shipped: Shippe
     which = np.linalg.norm(np.array(corners)[:, None] - at, axis=2).argmin(axis=1)
     for i, (geom, newtons) in enumerate(zip(red, run.force_measured[0, 100], strict=True)):
         local = (np.array(corners)[which == i] - at[i]) @ axes
-        assert np.allclose(np.hypot(local[:, 0], local[:, 1]), belief.mu[i] * local[:, 2], atol=1e-5)
+        assert np.allclose(np.hypot(local[:, 0], local[:, 1]), belief.contacts.mu[i] * local[:, 2], atol=1e-5)
         if run.truth.dim == 3:
             outward = local * [1.0, 1.0, 0.0] @ axes.T @ (np.asarray(scene.camera[0].pos) - at[i])
             assert outward.max() < 0.3 * np.abs(outward).max()
-        floor = belief.f_min[i] * np.linalg.norm(arrow(geom)) / np.linalg.norm(newtons)
+        floor = belief.contacts.f_min[i] * np.linalg.norm(arrow(geom)) / np.linalg.norm(newtons)
         assert local[:, 2].min() == pytest.approx(floor, abs=1e-5)
 
 

@@ -1,16 +1,14 @@
 """The compiled step: of every world the problem is stated, solved within bounds and certified; the wrench is turned."""
 
-from typing import NamedTuple
-
 import numpy as np
+from pivoting.controller.belief import Belief, BelievedObject, HeldContacts, WrenchSource
 from pivoting.controller.contacts import fill_jacobian
-from pivoting.controller.kernels.compilation import kernel
+from pivoting.controller.kernels.compilation import kernel, subroutine
 from pivoting.controller.kernels.interior_point import contact_wrench
 from pivoting.controller.kernels.planar_closed_form import planar_wrench
 from pivoting.controller.kernels.required_wrench import fill_required
 from pivoting.controller.rotations import fill_rotation, turned
 from pivoting.controller.solution import FAILED, INACCURATE, SOLVED
-from pivoting.controller.validate import Array
 from pivoting.controller.wrench_bounds import (
     Stacked,
     begin_multiplier,
@@ -25,53 +23,33 @@ HEAVIEST = 30.0  # of the weight: a bound that needs more is left to `BoundedSol
 STATE = 13  # numbers of a state: position (3), quaternion (4), velocity (3), angular velocity (3), world axes
 
 
-class Belief(NamedTuple):
-    """What the compiled step needs to know, as arrays.
-
-    Attributes:
-        points, offsets, frames: (K, 3), (K, 3), (K, 3, 3) of the contacts, see `fill_jacobian`.
-        pivot: (3,) from the CoM to the point that stays put (the contacts' mean), or rolls, object axes [m].
-        offset: (3,) from there to where it touches (the contacts' mean), world axes [m].
-        mu: (K,) that may be used.  f_min: (K,) [N].
-        mass: [kg].  inertia: (3, 3) object axes [kg m^2].  gravity: (3,) world axes [m/s^2].
-        law: (feedforward, kp, kd, velocity_terms), see `Law`.
-        Q_w, Q_f: weights, see `WrenchProblem`.
-        wrench_map, force_map: see `Space`.
-    """
-
-    points: Array
-    offsets: Array
-    frames: Array
-    pivot: Array
-    offset: Array
-    mu: Array
-    f_min: Array
-    mass: float
-    inertia: Array
-    gravity: Array
-    law: tuple[float, float, float, float]
-    Q_w: Array
-    Q_f: Array
-    wrench_map: Array
-    force_map: Array
-
-
 @kernel
 def state_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ignore[no-untyped-def]
     """Write R (3, 3), J (nw, K d) and the required wrench b (nw,) at one state."""
     fill_rotation(q, R)
-    fill_jacobian(R, belief.points, belief.offsets, belief.frames, belief.wrench_map, belief.force_map, J)
+    fill_jacobian(R, belief.contacts, belief.source.map, J)
     fill_required(R, q, omega, q_d, omega_d, alpha_d, belief, b)
+
+
+@subroutine
+def belief_of(beliefs, i):  # type: ignore[no-untyped-def]
+    """The `Belief` of one world among those of `belief.for_worlds`."""
+    (mass, inertia, gravity), contacts, (wrench_map, Q_w), law = beliefs
+    points, offsets, frames, turning, pivot, offset, mu, f_min, force_map, Q_f = contacts
+    held = HeldContacts(
+        points[i], offsets[i], frames[i], turning, pivot[i], offset[i], mu[i], f_min[i], force_map, Q_f[i]
+    )
+    return Belief(BelievedObject(mass[i], inertia[i], gravity[i]), held, WrenchSource(wrench_map, Q_w[i]), law)
 
 
 @kernel
 def step_worlds(  # type: ignore[no-untyped-def]
-    belief, bounds, own, planar, several, tolerance, states, desired, external, out, status
+    beliefs, bounds, own, planar, several, tolerance, states, desired, external, out, status
 ):  # fmt: skip
     """State, solve and certify the problem of every world.
 
     Args:
-        belief: the values of `Belief`, shared by the worlds.
+        beliefs: of the worlds, or one that they share, see `belief.for_worlds`.
         bounds: the values of `WrenchBounds.stacked`, or None. One that is not on a rate is kept, as a heavier weight;
             where that needs more than `HEAVIEST` times the weight, or a second bound, the answer is that without any.
         own, planar, several: `WrenchController.workspace()`.
@@ -86,12 +64,13 @@ def step_worlds(  # type: ignore[no-untyped-def]
             (K d), contact axes; residual.
         status: (W,) int8, written: 0 solved, 1 inaccurate, 2 failed.
     """
-    belief = Belief(*belief)
-    nw = belief.wrench_map.shape[0]
-    last = out.shape[1] - 1
+    each, belief = beliefs[0][0].shape[0], belief_of(beliefs, 0)
+    nw, last = belief.source.map.shape[0], out.shape[1] - 1
     R, J, heavier, root = own
-    Q_w, Q_f, mu, f_min = belief.Q_w, belief.Q_f, belief.mu, belief.f_min  # taken out once: it shows in the plane
     for i in range(states.shape[0]):
+        if each > 1:
+            belief = belief_of(beliefs, i)
+        Q_w, Q_f, mu, f_min = belief.source.Q_w, belief.contacts.Q_f, belief.contacts.mu, belief.contacts.f_min
         j, b, wrench, force = i % desired.shape[0], out[i, :nw], out[i, nw : 2 * nw], out[i, 2 * nw : last]
         q, omega = states[i, 3:7], states[i, 10:13]
         state_problem(belief, q, omega, desired[j, :4], desired[j, 4:7], desired[j, 7:10], R, J, b)

@@ -12,11 +12,11 @@ def fill_required(R, q, omega, q_d, omega_d, alpha_d, belief, out):  # type: ign
     Args:
         R, q: (3, 3), (4,) orientation, object to world; omega: (3,) angular velocity, world axes [rad/s].
         q_d, omega_d, alpha_d: the reference's orientation, angular velocity and acceleration, likewise.
-        belief: the object, the law and the contacts' mean, see `compiled_step.Belief`.
+        belief: the object, the law and the contacts' mean, a `Belief`.
     """
     feedforward, kp, kd, c = belief.law
-    mass, inertia, gravity = belief.mass, belief.inertia, belief.gravity
-    pivot, offset, wrench_map = belief.pivot, belief.offset, belief.wrench_map
+    mass, inertia, gravity = belief.object
+    pivot, offset, wrench_map = belief.contacts.pivot, belief.contacts.offset, belief.source.map
     e0, e1, e2 = rotation_error(q, q_d)
     w0, w1, w2 = into(R, omega[0], omega[1], omega[2])
     v0, v1, v2 = into(R, omega_d[0], omega_d[1], omega_d[2])

@@ -79,6 +79,8 @@ class Horizon:
             raise fail("controller", controller, "a WrenchController")
         if any(contact.radius for contact in controller.contacts):
             raise fail("controller", "one whose contact rolls", "one whose contacts are points of the object")
+        if any(contact.fixed_to == "object" for contact in controller.contacts):
+            raise fail("controller", "one with a contact on the object", "one whose contacts are on the environment")
         if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or not 1 <= steps <= 10_000:
             raise fail("steps", steps, "a whole number from 1 to 10000")
         one_of("integrator", integrator, tuple(INTEGRATORS))
@@ -124,7 +126,7 @@ class Horizon:
     @cached_property
     def _kept(self) -> Array:
         """(6,) 1 for the directions, translations and rotations, in which the object can move; else 0."""
-        return np.abs(self.controller.belief.wrench_map).sum(axis=0)
+        return np.abs(self.controller.belief.source.map).sum(axis=0)
 
     @cached_property
     def _to_table(self) -> Array:
@@ -154,7 +156,7 @@ class Horizon:
 
     def height(self, state: BodyState) -> float:
         """How far the lowest of the `clear` points is above the lowest contact, over the lever; inf without any."""
-        points = np.concatenate([self.controller.belief.points, self.clear])
+        points = np.concatenate([self.controller.belief.contacts.points, self.clear])
         heights = rotated(np.asarray(state.orientation), points) @ self.table[:, 2]
         contacts, others = np.split(heights, [len(self.controller.contacts)])
         return float((others - contacts.min()).min(initial=np.inf)) / self.controller.units.length
@@ -166,7 +168,7 @@ class Horizon:
             orientations: (N, 4) quaternions object to world, at `times`.
         """
         q = unit_quaternions("orientations", orientations, (self.steps, 4))
-        pivot = self.controller.belief.pivot
+        pivot = self.controller.belief.contacts.pivot
         there = np.asarray(state.position) + rotated(np.asarray(state.orientation), pivot)
         return there - rotated(q, pivot), q
 

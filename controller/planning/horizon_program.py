@@ -42,12 +42,12 @@ class HorizonProgram:
         self.horizon, self._belief, self._units = horizon, belief, horizon.controller.units
         self._body = _mechanics(horizon)
         force, scale = self._units.force, self._units.wrench
-        nq, n = len(belief.Q_w), len(belief.Q_f)
-        self._fixed = fixed_pairs(belief.points, belief.pivot, belief.wrench_map)
+        nq, n = len(belief.source.Q_w), len(belief.contacts.Q_f)
+        self._fixed = fixed_pairs(belief.contacts.points, belief.contacts.pivot, belief.source.map)
         self._sticking = space.dim + len(self._fixed) if horizon.stick else 0
         self._clear = np.array(horizon.clear)
         self._Q = np.array(horizon.Q) / force**2
-        own = friction_limits(belief.mu, belief.f_min / force, space.dim)
+        own = friction_limits(belief.contacts.mu, belief.contacts.f_min / force, space.dim)
         bound = wrench_limits(horizon.bounds, nq, horizon.edges, scale, horizon.h)
         linear = [len(own.linear), len(bound.linear), len(self._clear)]
         cones = [len(own.cone), len(bound.cone)]
@@ -86,7 +86,7 @@ class HorizonProgram:
         sides += [own.cone_side, bound.cone_side]
         groups = sides[0], np.concatenate(sides[1:4]), np.concatenate(sides[4:])
         self._sides = np.concatenate([np.tile(group, N) for group in groups])
-        weights = np.triu(scale[:, None] * belief.Q_w * scale / force**2), np.triu(belief.Q_f)
+        weights = np.triu(scale[:, None] * belief.source.Q_w * scale / force**2), np.triu(belief.contacts.Q_f)
         here = self._wide * np.arange(N)[:, None]
         square = [(pose, np.triu(_pattern(tracked)), None), (wrench, weights[0] != 0.0, weights[0])]
         square.append((push, weights[1] != 0.0, weights[1]))
@@ -133,8 +133,8 @@ class HorizonProgram:
 
     def objective(self, desired: tuple[Array, Array], guess: Guess) -> float:
         """sum 1/2 w'Q_w w + 1/2 f'Q_f f + 1/2 e'Q e, in SI units, poses taken as they are."""
-        applied = np.vdot(guess.wrench @ self._belief.Q_w, guess.wrench)
-        pushed = np.vdot(guess.force @ self._belief.Q_f, guess.force)
+        applied = np.vdot(guess.wrench @ self._belief.source.Q_w, guess.wrench)
+        pushed = np.vdot(guess.force @ self._belief.contacts.Q_f, guess.force)
         N, nq = self.horizon.steps, len(self._units.pose)
         out = np.empty((N, nq, nq)), np.empty((N, nq))
         tracking = fill_tracking(self._body, self._Q, guess.path, *desired, Scratch.empty(), *out)
@@ -151,7 +151,7 @@ class HorizonProgram:
 
     def _generic(self) -> tuple[Rows, Array]:
         """Rows and curvature about a path without any symmetry, which show what may be other than zero."""
-        rng, N, W = np.random.default_rng(0), self.horizon.steps, self._belief.wrench_map
+        rng, N, W = np.random.default_rng(0), self.horizon.steps, self._belief.source.map
         vectors = rng.normal(size=(2 * N + 3, len(W))) @ W
         turns = exponential(vectors[:, 3:])
         path = Path(
@@ -160,7 +160,7 @@ class HorizonProgram:
             np.concatenate([vectors[-1, :3], turns[-1]]),
             vectors[-2],
         )
-        guess = Guess(path, rng.normal(size=(N, len(W))), rng.normal(size=(N, len(self._belief.Q_f))))
+        guess = Guess(path, rng.normal(size=(N, len(W))), rng.normal(size=(N, len(self._belief.contacts.Q_f))))
         wanted = np.ascontiguousarray(vectors[N + 1 : 2 * N + 1, :3]), turns[N + 1 : 2 * N + 1]
         curvature = np.empty((N, len(W), len(W)))
         fill_tracking(self._body, self._Q, path, *wanted, Scratch.empty(), curvature, np.empty((N, len(W))))
@@ -170,16 +170,16 @@ class HorizonProgram:
 def _mechanics(horizon: Horizon) -> Mechanics:
     """The object of a horizon, in table axes."""
     belief = horizon.controller.belief
-    used, component = np.nonzero(belief.wrench_map)
+    used, component = np.nonzero(belief.source.map)
     return Mechanics(
-        mass=belief.mass,
-        inertia=np.array(belief.inertia),
-        points=belief.points,
-        pivot=belief.pivot,
-        frames=np.ascontiguousarray(horizon.table.T @ belief.frames @ belief.force_map),
-        gravity=horizon.table.T @ belief.gravity,
+        mass=belief.object.mass,
+        inertia=np.array(belief.object.inertia),
+        points=belief.contacts.points,
+        pivot=belief.contacts.pivot,
+        frames=np.ascontiguousarray(horizon.table.T @ belief.contacts.frames @ belief.contacts.force_map),
+        gravity=horizon.table.T @ belief.object.gravity,
         pick=component,
-        sign=belief.wrench_map[used, component],
+        sign=belief.source.map[used, component],
         units=horizon.controller.units,
     )
 

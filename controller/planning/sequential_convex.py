@@ -136,7 +136,7 @@ class Planner:
         position[0], orientation[0] = start.position[0], start.orientation[0]
         position[1:], orientation[1:] = poses
         path = start._replace(position=position, orientation=orientation)
-        zeros = np.zeros((N, len(belief.Q_w))), np.zeros((N, len(belief.Q_f)))
+        zeros = np.zeros((N, len(belief.source.Q_w))), np.zeros((N, len(belief.contacts.Q_f)))
         return Guess(path, *(zeros if forces is None else forces))
 
     def _guesses(
@@ -163,8 +163,8 @@ class Planner:
         N, belief = self.horizon.steps, self.horizon.controller.belief
         if not isinstance(forces, tuple | list) or len(forces) != 2:
             raise fail(name, forces, "wrenches (N, nw) and contact forces (N, K d)")
-        wrench = array(f"{name}: wrenches", forces[0], (N, len(belief.Q_w)))
-        force = array(f"{name}: forces", forces[1], (N, len(belief.Q_f)))
+        wrench = array(f"{name}: wrenches", forces[0], (N, len(belief.source.Q_w)))
+        force = array(f"{name}: forces", forces[1], (N, len(belief.contacts.Q_f)))
         return wrench.copy(), force.copy()  # that may be written: kernels tell the two apart
 
     def plan(

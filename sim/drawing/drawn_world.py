@@ -131,7 +131,7 @@ class DrawnWorld:
     @property
     def planned_mu(self) -> Array:
         """(K,) friction that the controller may use, (1 - margin) mu."""
-        return self.run.attached.controller.belief.mu
+        return self.run.attached.controller.belief.contacts.mu
 
     @cached_property
     def corner(self) -> Array:

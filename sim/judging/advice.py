@@ -200,7 +200,7 @@ def _floors(case: _Case) -> Iterator[float]:
     K = len(run.points)
     off = np.linalg.norm(run.force_measured[i] - run.force[i], axis=-1)
     error = run.unit * float(np.quantile(np.nan_to_num(off), 0.95))
-    spare = max(run.world.mu - float(np.max(run.attached.controller.belief.mu)), 0.1 * run.world.mu)
+    spare = max(run.world.mu - float(np.max(run.attached.controller.belief.contacts.mu)), 0.1 * run.world.mu)
     some = {0.5 * case.weight / K, 2.0 * case.weight / K, 5.0 * case.weight / K}
     rows = run.world.contact_rows
     most = 20.0 * case.weight
@@ -211,7 +211,7 @@ def _floors(case: _Case) -> Iterator[float]:
         opening = c_n * max(1.0 - 0.5 * rows.b * rows.h, 0.0) / rows.regularisation * rows.points / K
         some |= {2.0 * run.unit * opening}
     some |= {1.5 * error * (1.0 + run.world.mu) / spare}
-    least = max(1.2 * run.unit * float(run.attached.controller.belief.f_min.min()), 0.05 * case.weight / K)
+    least = max(1.2 * run.unit * float(run.attached.controller.belief.contacts.f_min.min()), 0.05 * case.weight / K)
     yield from sorted({_up(floor) for floor in some if least < floor < most})
 
 

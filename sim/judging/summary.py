@@ -95,6 +95,6 @@ def contact_figures(run: "Run") -> dict[str, Any]:
         "impratio": float(opt.impratio),
         "cone": mujoco.mjtCone(int(opt.cone)).name.removeprefix("mjCONE_").lower(),
         "replaced": dict(run.world.replaced),
-        "f_min_N": run.unit * float(run.attached.controller.belief.f_min.max()),
+        "f_min_N": run.unit * float(run.attached.controller.belief.contacts.f_min.max()),
         **({} if run.world.settings is None else {key: getattr(run.world.settings, key) for key in _CHOSEN}),
     }

@@ -1,5 +1,7 @@
 """A control within bounds: what exceeds them is solved for again."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.bounded_solver import BoundedSolver
@@ -18,17 +20,18 @@ class BoundedControl:
     """Another control within bounds: a wrench that still exceeds one is solved for again, see `BoundedSolver`.
 
     Args:
+        controllers: one for each world, or one that they share.
         dt: time step [s].
 
     Attributes:
         inner: the other control.
     """
 
-    def __init__(self, inner: Control, controller: WrenchController, bounds: WrenchBounds, dt: float):
+    def __init__(self, inner: Control, controllers: Sequence[WrenchController], bounds: WrenchBounds, dt: float):
         self.inner, self._dt = inner, dt
-        self._bounds = bounds.stacked(len(controller.Q_w))
+        self._bounds = bounds.stacked(len(controllers[0].Q_w))
         self._rated = bounds.rated
-        self._solve = BoundedSolver(controller, bounds, dt)
+        self._solvers = [BoundedSolver(controller, bounds, dt) for controller in controllers]
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
         self.inner(k, states, before, out)
@@ -38,7 +41,8 @@ class BoundedControl:
         if not most > OVER:
             return
         for i in np.flatnonzero(excess > OVER):
-            answer = self._solve(states.orientation[i], out.required[i], None if last is None else last[i])
+            solve = self._solvers[i % len(self._solvers)]
+            answer = solve(states.orientation[i], out.required[i], None if last is None else last[i])
             if not answer.residual <= BETTER_THAN_NONE:
                 out.wrench[i], out.status[i] = np.nan, FAILED
                 continue
@@ -53,7 +57,7 @@ class BoundedControl:
         self.inner.prepare(states, out)
         fill_excess(self._bounds, out.wrench, out.wrench, self._dt, np.empty(len(out.wrench)))
         for _ in range(2):  # set up, then in place
-            self._solve(states.orientation[0], out.required[0])
+            self._solvers[0](states.orientation[0], out.required[0])
 
 
 def applied(wrench: Array | None) -> Array | None:

@@ -1,7 +1,10 @@
 """The control of one law at every step: the wrench problem of each world, stated, solved and certified in one call."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.controller.belief import for_worlds
 from pivoting.controller.kernels.compiled_step import step_worlds
 from pivoting.controller.wrench_bounds import WrenchBounds
 from pivoting.controller.wrench_controller import WrenchController
@@ -12,16 +15,20 @@ TOLERANCE = 1e-9  # relative KKT residual of an answer that counts as solved
 
 
 class LawSolver:
-    """The controller's law for all worlds, within bounds as far as the compiled step keeps them.
+    """The controllers' law for all worlds, within bounds as far as the compiled step keeps them.
 
     Args:
+        controllers: one for each world, or one that they share.
         correct: what is added to the reference, see `stages.Correct`.
     """
 
-    def __init__(self, controller: WrenchController, bounds: WrenchBounds, correct: tuple[Correct, ...] = ()):
-        self._belief, self._work = tuple(controller.belief), controller.workspace()
-        self._bounds = tuple(bounds.stacked(len(controller.Q_w))) if bounds.any else None
-        self._none = np.zeros((1, len(controller.Q_w)))
+    def __init__(
+        self, controllers: Sequence[WrenchController], bounds: WrenchBounds, correct: tuple[Correct, ...] = ()
+    ):
+        nw, _ = controllers[0].widths
+        self._beliefs, self._work = for_worlds([each.belief for each in controllers]), controllers[0].workspace()
+        self._bounds = tuple(bounds.stacked(nw)) if bounds.any else None
+        self._none = np.zeros((1, nw))
         self._correct = correct
 
     def __call__(self, states: States, desired: Desired, out: Answers, external: Array | None = None) -> None:
@@ -33,7 +40,7 @@ class LawSolver:
     def solve(self, states: States, desired: Desired, out: Answers, external: Array | None = None) -> None:
         """Write the answers on the reference as it is."""
         known = self._none if external is None else external
-        step_worlds(self._belief, self._bounds, *self._work, TOLERANCE, states.values, desired.values, known, *out[:2])
+        step_worlds(self._beliefs, self._bounds, *self._work, TOLERANCE, states.values, desired.values, known, *out[:2])
 
 
 class LawControl:
@@ -41,11 +48,12 @@ class LawControl:
 
     Args:
         desired: (N+1, 4), (N+1, 3), (N+1, 3), the reference at every step.
-        external: (N+1, nw) known wrenches on the object at every step, object axes; or (1, nw), always the same.
+        external: (N+1, W, nw) known wrenches on the object at every step, object axes; or with axes of 1, always the
+            same, and the same for all worlds.
     """
 
     def __init__(self, law: LawSolver, desired: tuple[Array, Array, Array], external: Array):
-        self._law, self._external = law, external[:, None]
+        self._law, self._external = law, external
         self._desired = stacked(*desired)[:, None]
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:

@@ -20,6 +20,13 @@ Array = NDArray[np.float64]
 POSITION, ORIENTATION, VELOCITY, ANGULAR_VELOCITY = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13)
 
 
+def _shown(values: Array) -> Array:
+    """A view that cannot be written to: no stage changes what another has given."""
+    view = values.view()
+    view.flags.writeable = False
+    return view
+
+
 class States:
     """The states of W worlds at one time.
 
@@ -32,7 +39,7 @@ class States:
     __slots__ = ("joint_position", "joint_velocity", "values")
 
     def __init__(self, values: Array, joint_position: Array, joint_velocity: Array):
-        self.values, self.joint_position, self.joint_velocity = values, joint_position, joint_velocity
+        self.values, self.joint_position, self.joint_velocity = map(_shown, (values, joint_position, joint_velocity))
 
     @property
     def position(self) -> Array:
