@@ -69,7 +69,7 @@ def test_coincident_boxes_are_as_one(tmp_path: Path, size: str, contact: str) ->
             COUPLED / (COUPLED + 1)
         )
     assert runs[1].measures.slip_max_m == pytest.approx(runs[0].measures.slip_max_m, rel=1e-3)
-    assert runs[1].contacts.depth.max() == pytest.approx(runs[0].contacts.depth.max(), rel=1e-3)
+    assert runs[1].log.contacts.depth.max() == pytest.approx(runs[0].log.contacts.depth.max(), rel=1e-3)
 
 
 @pytest.mark.parametrize(

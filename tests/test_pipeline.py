@@ -90,7 +90,8 @@ def test_a_control_of_ones_own_that_solves_the_same_problems_makes_the_same_run(
         space = controller.space
         desired = Motion(
             float(space.angle(now.desired.orientation)[0]),
-            *(float(values[0] @ space.axial(1.0)) for values in now.desired[1:]),
+            float(now.desired.angular_velocity[0] @ space.axial(1.0)),
+            float(now.desired.angular_acceleration[0] @ space.axial(1.0)),
         )
         angles = space.angle(now.states.orientation)
         rates = now.states.angular_velocity @ space.axial(1.0)

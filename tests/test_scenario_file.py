@@ -141,7 +141,8 @@ def test_a_kept_run_is_run_again_to_the_same_arrays(words: list[str], tmp_path: 
 def arrays(log: Any) -> list[np.ndarray]:
     """Those that no clock is in."""
     found = [each for name, each in log._asdict().items() if name != "control_ns" and each is not None]
-    return [values for each in found for values in (each if isinstance(each, tuple) else (each,))]
+    flat = [values for each in found for values in (each if isinstance(each, tuple) else (each,))]
+    return [values for values in flat if isinstance(values, np.ndarray)]
 
 
 def test_more_can_be_changed_of_a_file(tmp_path: Path) -> None:

@@ -116,14 +116,17 @@ class Answers(NamedTuple):
         return cls(np.empty((*shape, 2 * nw + forces + 1)), np.empty(shape, np.int8), nw)
 
 
-class Desired(NamedTuple):
+class Desired:
     """Where the object is to be.
 
     Attributes:
         values: (W or 1, 10) the columns of the properties, in their order.
     """
 
-    values: Array
+    __slots__ = ("values",)
+
+    def __init__(self, values: Array):
+        self.values = values
 
     @property
     def orientation(self) -> Array:
