@@ -1,6 +1,7 @@
 """The control of one law at every step: the wrench problem of each world, stated, solved and certified in one call."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,21 +27,21 @@ class LawSolver:
         self, controllers: Sequence[WrenchController], bounds: WrenchBounds, correct: tuple[Correct, ...] = ()
     ):
         nw, _ = controllers[0].widths
-        self._beliefs, self._work = for_worlds([each.belief for each in controllers]), controllers[0].workspace()
-        self._bounds = tuple(bounds.stacked(nw)) if bounds.any else None
+        beliefs = for_worlds([each.belief for each in controllers])
+        bounded = tuple(bounds.stacked(nw)) if bounds.any else None
+        self._step = partial(step_worlds, beliefs, bounded, *controllers[0].workspace(), TOLERANCE)
         self._none = np.zeros((1, nw))
-        self._correct = correct
+        self.correct = correct
 
     def __call__(self, states: States, desired: Desired, out: Answers, external: Array | None = None) -> None:
         """Write the answers on the corrected reference; `external`: (W or 1, nw) known wrenches, see `step_worlds`."""
-        for correct in self._correct:
+        for correct in self.correct:
             desired = correct(states, desired)
         self.solve(states, desired, out, external)
 
     def solve(self, states: States, desired: Desired, out: Answers, external: Array | None = None) -> None:
         """Write the answers on the reference as it is."""
-        known = self._none if external is None else external
-        step_worlds(self._beliefs, self._bounds, *self._work, TOLERANCE, states.values, desired.values, known, *out[:2])
+        self._step(states.values, desired.values, self._none if external is None else external, out.values, out.status)
 
 
 class LawControl:
@@ -53,18 +54,15 @@ class LawControl:
     """
 
     def __init__(self, law: LawSolver, desired: tuple[Array, Array, Array], external: Array):
-        self._law, self._external = law, external
-        self._desired = stacked(*desired)[:, None]
+        self._desired, self._external = stacked(*desired)[:, None], external
+        self._always = external[0] if len(external) == 1 else None
+        self._solve, self._decide = law.solve, law if law.correct else law.solve  # a call less at every step
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
-        self._law(states, self._at(k), out, self._known(k))
+        self._decide(
+            states, Desired(self._desired[k]), out, self._external[k] if self._always is None else self._always
+        )
 
     def prepare(self, states: States, out: Answers) -> None:
         """Compile."""
-        self._law.solve(states, self._at(0), out, self._known(0))
-
-    def _at(self, k: int) -> Desired:
-        return Desired(self._desired[k])
-
-    def _known(self, k: int) -> Array:
-        return self._external[min(k, len(self._external) - 1)]
+        self._solve(states, Desired(self._desired[0]), out, self._external[0])
