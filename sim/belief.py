@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 from pivoting.controller.validate import fail
@@ -14,18 +15,24 @@ from pivoting.sim.pace import closing_force
 from pivoting.sim.placement import Placement, placed
 from pivoting.sim.scenarios.scenario import Scenario
 from pivoting.sim.scenarios.scenario_keys import CONTROL_KEYS
+from pivoting.sim.stances import Stance
 
 
 class Believed(NamedTuple):
     """scene: as the controller knows it.  attached: the controller on it.  placement: of the object there.
 
-    controllers: one for each world, or one that they share; the first is that of `attached`.
+    stances: one after another; the first controller of the first is that of `attached`.
     """
 
     scene: Scene
     attached: Attached
     placement: Placement
-    controllers: tuple[WrenchController, ...]
+    stances: tuple[Stance, ...]
+
+    @property
+    def controllers(self) -> tuple[WrenchController, ...]:
+        """Of the first stance: one for each world, or one that they share."""
+        return self.stances[0].controllers
 
 
 def believe(
@@ -53,13 +60,15 @@ def believe(
     floor = min(floors, default=case.f_min or 0.0)
     if there.load.force == 0.0 and floor == 0.0:
         raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the object on its support")
+    K, L = len(there.contacts), len(there.landing)
     if controllers:
-        return Believed(scene, Attached(scene.compiled, there.body, controllers[0]), there, controllers)
-    attached = attach(
+        return Believed(
+            scene, Attached(scene.compiled, there.body, controllers[0]), there, (Stance.of(K * [True], controllers),)
+        )
+    own = partial(
+        attach,
         scene.compiled,
         body=case.body,
-        contacts=list(there.contacts),
-        radius=there.radius,
         law=case.control_law(),
         mu=case.mu,
         margin=case.margin,
@@ -67,7 +76,14 @@ def believe(
         Q_w=case.wrench_weight(there.body.dim, read.unit),
         support=case.support,
     )
-    return Believed(scene, attached, there, (attached.controller,))
+    attached = own(contacts=list(there.contacts), radius=there.radius)
+    if case.landing == "ignored":
+        return Believed(scene, attached, there, (Stance.of(K * [True], (attached.controller,)),))
+    if there.body.dim == 2 or there.radius.any() or not L:
+        raise fail("landing", "held", "ignored: this object has no other corners in space to land on")
+    landed = own(contacts=[*there.contacts, *there.landing]).controller
+    on_contact = Stance.of(K * [True] + L * [False], (attached.controller,))
+    return Believed(scene, attached, there, (on_contact, Stance.of((K + L) * [True], (landed,))))
 
 
 def _given(given: WrenchController | Sequence[WrenchController] | None, worlds: int) -> tuple[WrenchController, ...]:

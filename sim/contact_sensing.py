@@ -135,7 +135,9 @@ def sort_contacts(sensed, contacts, touching, pose, declared, rows, at, share, s
             for k in range(K):
                 force[n, w, k, 0] = force[n, w, k, 1] = force[n, w, k, 2] = 0.0
             if rows is not None:
-                slides = begin_rows(sums)
+                begin_rows(sums)
+                for k in range(K):
+                    held[2][n, w, k] = False
             x = y = z = deepest = strange = strangers = listed = 0.0
             for first in range(contacts[0], contacts[1], FIELDS):
                 if not values[first] > 0.0:  # slots in use come first
@@ -159,7 +161,9 @@ def sort_contacts(sensed, contacts, touching, pose, declared, rows, at, share, s
                         force[n, w, k, 2] += share[k] * c
                     if rows is not None and push > 0.0:
                         pulls = pull, side
-                        slides |= add_row(rows, push, pulls, -apart, where, tangent, other, at, share, sums)
+                        if add_row(rows, push, pulls, -apart, where, tangent, other, at, share, sums):
+                            for k in range(K):
+                                held[2][n, w, k] |= share[k] > 0.0
                 elif not landing:
                     size = np.sqrt(a * a + b * b + c * c)
                     strange += size
@@ -175,4 +179,3 @@ def sort_contacts(sensed, contacts, touching, pose, declared, rows, at, share, s
             found[n, w], stray[n, w], strays[n, w], depth[n, w] = of_support, strange, strangers, deepest
             if rows is not None:
                 end_rows(sums, held[0][n, w], held[1][n, w])
-                held[2][n, w] = slides

@@ -10,11 +10,11 @@ from pivoting.controller.rotations import exponential, quaternion_product
 from pivoting.models.errors import ModelError
 from pivoting.models.frames import matrix, quaternion
 from pivoting.models.names import label
-from pivoting.models.placement.contact_candidates import planar_stance, stance
+from pivoting.models.placement.contact_candidates import find_pivot, find_planar_pivot
 from pivoting.models.placement.convex_hull import body_size
 from pivoting.models.placement.edge_grip import grip
 from pivoting.models.placement.given_contacts import NEAR
-from pivoting.models.placement.tilt_range import Arc, Stance
+from pivoting.models.placement.tilt_range import Arc, Pivot
 from pivoting.models.rigid_body import RigidBody, file_frame, initial_data, place, read_body
 from pivoting.sim.judging.predicted_slip import stepped_point
 from pivoting.sim.judging.undeclared_contacts import refuse_strays
@@ -59,6 +59,12 @@ class Placement:
     def lever(self) -> float:
         """From where the first contact touches to the CoM [m]."""
         return float(np.linalg.norm(self.body.com - self.contacts[0]) + self.radius[0])
+
+    @property
+    def landing(self) -> Array:
+        """(L, 3) the corners of that face that are none of the contacts, body frame [m]."""
+        apart = np.linalg.norm(self.face[:, None] - self.contacts, axis=-1).min(axis=1, initial=np.inf)
+        return self.face[apart > NEAR * np.linalg.norm(np.ptp(self.face, axis=0))]
 
     @property
     def load(self) -> Load:
@@ -121,14 +127,14 @@ def transplanted(placed: Placement, model: mujoco.MjModel, body: RigidBody, grow
 
 
 def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody, near: float, unit: float) -> Placement:
-    """In space the contacts are found on the object, as `contact_candidates.stance` does."""
+    """In space the contacts are found on the object, as `contact_candidates.find_pivot` does."""
     table, gap = matrix(body.table), np.deg2rad(LOWEST)
     data = initial_data(model)
     now = data.xmat[body.index].reshape(3, 3)
     origin, axes = file_frame(model, body.index)
     contact = case.contact if isinstance(case.contact, str) else _in_body_frame(case.contact, (origin, axes))
     arc = None if case.about == "yaw" else _arc(case)
-    found = stance(
+    found = find_pivot(
         model,
         body.index,
         contact,
@@ -152,7 +158,7 @@ def _spatial(case: Scenario, model: mujoco.MjModel, body: RigidBody, near: float
 
 
 def _misfit(
-    model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody, near: float, unit: float, arc: Arc, one: Stance
+    model: mujoco.MjModel, data: mujoco.MjData, body: RigidBody, near: float, unit: float, arc: Arc, one: Pivot
 ) -> str:
     """Why a contact cannot be had where the object stands, on the way of an arc about it, or nothing."""
     table, at = matrix(body.table), _below(model, body, one.points[0])
@@ -198,7 +204,7 @@ def _in_body_frame(points: ArrayLike, frame: tuple[Array, Array]) -> ArrayLike:
 def _planar(case: Scenario, model: mujoco.MjModel, body: RigidBody) -> Placement:
     """In the plane the contact is the left end of the face that is down at theta = 0, unless it is given."""
     axes, table, gap = matrix(body.axes), matrix(body.table), np.deg2rad(LOWEST)
-    point, radius, most = planar_stance(model, body.index, case.contact, axes, arc=_arc(case))
+    point, radius, most = find_planar_pivot(model, body.index, case.contact, axes, arc=_arc(case))
     face = point - radius * axes[:, 2]
     limits = (gap, most - gap)
     at = _below(model, body, point)

@@ -52,6 +52,7 @@ _MEANINGS = {  # name: dimensions, unit, what it is
     "force": ("world step contact contact_axis", "N", "contact forces predicted by the solution, table axes"),
     "residual": ("world step", "", "relative KKT residual"),
     "status": ("world step", "", "status of the answer"),
+    "stance": ("world step", "", "number of the stance, the set of contacts that are to hold"),
     "acting": ("world step component", "N, N m", "wrench that acted, object axes"),
     "wrench_world": ("world step wrench_axis", "N, N m", "applied force and torque at the centre of mass, world axes"),
     "contact_force": ("world step contact xyz", "N", "contact forces on the object by MuJoCo, world axes"),
@@ -61,7 +62,7 @@ _MEANINGS = {  # name: dimensions, unit, what it is
     "contact_depth": ("world step", "m", "depth of the deepest contact with the support"),
     "held_give": ("world step contact table_axis", "m/s^2", "R f of the friction rows, along the table"),
     "held_above": ("world step contact", "m", "height of what the contact rows hold above what touches"),
-    "held_slides": ("world step", "", "whether a contact is at the limit of its friction"),
+    "held_slides": ("world step contact", "", "whether a contact is at the limit of its friction"),
     "control_ns": ("step", "ns", "time to sense, observe, state, solve and certify, all worlds together"),
     "start_qpos": ("world qpos", "", "joint positions of the model at time 0"),
     "start_qvel": ("world qvel", "", "joint velocities of the model at time 0"),
@@ -103,6 +104,7 @@ def named_arrays(run: "Run") -> dict[str, Array]:
     found |= {"force": run.force, "acting": log.acting, "wrench_world": log.wrench_world}
     found |= _of_fields("contact_", log.contacts) | _of_fields("held_", log.held) | {"control_ns": log.control_ns}
     found |= dict(zip(("start_qpos", "start_qvel"), run.start, strict=True))
+    found |= {"stance": run.stance}
     if run.plans is not None:
         found |= _of_fields("plans_", run.plans)
     if run.plan is not None:

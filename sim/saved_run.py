@@ -155,6 +155,8 @@ def _restored(begun: Begun, arrays: Arrays, outcome: Mapping[str, Any], python_o
         log=log_of(arrays),
         wall_s=outcome["wall_s"],
         plan=plan,
+        stances=begun.belief.stances,
+        stance=arrays.get("stance"),
         plans=plans_of(arrays),
         events=tuple(Event(*event) for event in outcome["events"]),
         engine_warnings=tuple(outcome["engine_warnings"]),

@@ -1,6 +1,7 @@
 """`simulate`: a closed-loop run, from a scenario to what is measured."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,6 +9,7 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 from pivoting.controller.orientation_references import Turn
 from pivoting.controller.validate import fail
+from pivoting.controller.wrench_bounds import WrenchBounds
 from pivoting.controller.wrench_controller import WrenchController
 from pivoting.models.errors import ModelError
 from pivoting.models.frames import matrix
@@ -26,11 +28,13 @@ from pivoting.sim.pipeline.plan_playback import PlanPlayback
 from pivoting.sim.pipeline.plant import Plant
 from pivoting.sim.pipeline.receding_horizon_control import RecedingHorizonControl
 from pivoting.sim.pipeline.stages import Control, Observe, Setting, Stages, build_stages
+from pivoting.sim.pipeline.stance_control import StanceControl
 from pivoting.sim.placement import Placement
 from pivoting.sim.run import Run
 from pivoting.sim.scenario_horizon import plan_playback, receding_horizon_control
 from pivoting.sim.scenarios.scenario import Scenario
 from pivoting.sim.scenarios.shipped_scenarios import scenario
+from pivoting.sim.stances import Stance
 from pivoting.sim.start_states import Samples, resting_depth, start_worlds
 from pivoting.sim.world import World, build_world
 
@@ -76,6 +80,10 @@ def simulate(
         raise fail("scenario", name, "a name or a Scenario")
     asked = (scenario(name) if isinstance(name, str) else name).change(**overrides)
     asked.refuse_without_effect(overrides, open_loop)
+    if asked.landing == "held" and (controller is not None or control is not None):
+        if "landing" in overrides:
+            raise fail("landing", "held", "left out: a controller or control of your own holds one set of contacts")
+        asked = replace(asked, landing="ignored")
     begun = set_up(asked, controller, worlds=worlds, seed=seed, first_world=first_world)
     decided = _control(begun, control, observe, open_loop)
     return _run(begun, decided, progress)
@@ -100,6 +108,11 @@ class Begun(NamedTuple):
     follow: Turn
     setting: Setting
     given: bool
+
+    @property
+    def bounds(self) -> WrenchBounds:
+        """On the wrench, in the model's units."""
+        return self.case.bounds(self.belief.placement.unit)
 
     @property
     def steps(self) -> int:
@@ -147,31 +160,52 @@ def set_up(
 
 def _control(begun: Begun, own: OwnControlFunction | None, observe: Observe | None, open_loop: bool) -> _Decided:
     """The scenario's control, or the user's own, and the stages around it."""
-    case, (_, attached, there, controllers) = begun.case, begun.belief
+    case, stances = begun.case, begun.belief.stances
     stages = build_stages(case.stages, begun.setting)
     if observe is not None:
         stages = stages._replace(observe=(*stages.observe, observe))
-    bounds, dt = case.bounds(there.unit), begun.world.dt
-    law = LawSolver(controllers, bounds, stages.correct)
-    drag = np.stack([drag_wrench(attached.body, controller, *begun.told) for controller in controllers], axis=1)
-    per_step = LawControl(law, begun.told, drag)
+    solvers = [LawSolver(stance.controllers, begun.bounds, stages.correct) for stance in stances]
+    laws = [_law_control(begun, *each) for each in zip(solvers, stances, strict=True)]
     handed = {"controller": begun.given, "control": own is not None, "observe": observe is not None}
     objects = tuple(name for name, there_is in handed.items() if there_is)
+    planned = open_loop or case.plan_hz is not None
+    if len(stances) > 1 and (planned or stages.correct):
+        raise fail("landing", "held", "ignored with a plan or integral action, which know one stance")
     if own is not None:
-        return _Decided(OwnControl(own, begun.told, dt), per_step, stages, objects)
-    if attached.body.drag is not None and (open_loop or case.plan_hz is not None):
-        raise ModelError(f"body = {attached.body.name!r}: a plan knows no joint damping or friction; must have none")
-    control: Control = per_step
-    if open_loop:
-        if len(controllers) > 1:
-            raise fail("controller", f"{len(controllers)} of them", "one in open loop, where one plan is played")
-        control = plan_playback(case, begun.belief, begun.follow, dt, begun.steps)
-    elif case.plan_hz is not None:
+        return _Decided(OwnControl(own, begun.told, begun.world.dt), laws[0], stages, objects)
+    if len(stances) == 1:
+        control = _planned(begun, solvers[0], open_loop) if planned else laws[0]
+        bounded = control if open_loop else _bounded(begun, control, stances[0])  # a plan is within them
+        return _Decided(bounded, laws[0], stages, objects)
+    controls = [_bounded(begun, law, stance) for law, stance in zip(laws, stances, strict=True)]
+    inner = StanceControl(stances, controls, begun.world.dt, begun.setting.worlds, begun.steps)
+    return _Decided(inner, laws[0], stages, objects)
+
+
+def _law_control(begun: Begun, solver: LawSolver, stance: Stance) -> LawControl:
+    """The law of a stance on the scenario's own reference."""
+    body = begun.belief.attached.body
+    drag = np.stack([drag_wrench(body, controller, *begun.told) for controller in stance.controllers], axis=1)
+    return LawControl(solver, begun.told, drag)
+
+
+def _bounded(begun: Begun, control: Control, stance: Stance) -> Control:
+    """A control within the scenario's bounds, where it has any."""
+    return BoundedControl(control, stance.controllers, begun.bounds, begun.world.dt) if begun.bounds.any else control
+
+
+def _planned(begun: Begun, law: LawSolver, open_loop: bool) -> Control:
+    """The control that makes plans, or plays one."""
+    belief, dt = begun.belief, begun.world.dt
+    if belief.attached.body.drag is not None:
+        name = belief.attached.body.name
+        raise ModelError(f"body = {name!r}: a plan knows no joint damping or friction; must have none")
+    if not open_loop:
         worlds = begun.setting.worlds
-        control = receding_horizon_control(case, begun.belief, law, begun.follow, worlds, dt, begun.steps)
-    if bounds.any and not open_loop:  # a plan is within them
-        control = BoundedControl(control, controllers, bounds, dt)
-    return _Decided(control, per_step, stages, objects)
+        return receding_horizon_control(begun.case, belief, law, begun.follow, worlds, dt, begun.steps)
+    if len(belief.controllers) > 1:
+        raise fail("controller", f"{len(belief.controllers)} of them", "one in open loop, where one plan is played")
+    return plan_playback(begun.case, belief, begun.follow, dt, begun.steps)
 
 
 def _run(begun: Begun, decided: _Decided, progress: Callable[[int, int], None] | None) -> Run:
@@ -187,10 +221,11 @@ def _run(begun: Begun, decided: _Decided, progress: Callable[[int, int], None] |
         values.flags.writeable = False
     table, wrench_map = matrix(world.truth.table), attached.controller.belief.source.map
     contacts = ContactLog(world.declared, world.contact_rows, table, world.sensors, begun.steps, worlds)
-    apply, widths = FreeWrench(batch, wrench_map, world.truth.index), attached.controller.widths
+    apply, K = FreeWrench(batch, wrench_map, world.truth.index), len(world.declared.points)
+    widths = len(wrench_map), K * world.truth.dim
     with engine_log() as warned:
         log, wall_s = run_steps(
-            Plant(batch), decided.stages, decided.control, apply, contacts, begun.steps, widths, progress
+            Plant(batch, world.sensors), decided.stages, decided.control, apply, contacts, begun.steps, widths, progress
         )
     return _kept(begun, decided, start, log, wall_s, (*world.warned, *warned))
 
@@ -220,6 +255,8 @@ def _kept(
         log=log,
         wall_s=wall_s,
         plan=planned.plan if isinstance(planned, PlanPlayback) else None,
+        stances=begun.belief.stances,
+        stance=decided.control.by_world() if isinstance(decided.control, StanceControl) else None,
         plans=None if horizons is None else horizons.log,
         events=() if horizons is None else tuple(horizons.events),
         engine_warnings=warnings,

@@ -28,7 +28,8 @@ class ContactMotion(Trajectory):
     @property
     def size(self) -> float:
         """Lever from the CoM to the contacts [m], against which lengths are judged."""
-        return lever(self.points) + float(np.mean(self.world.radius))
+        first = self.stances[0].held
+        return lever(self.points[first]) + float(np.mean(self.world.radius[first]))
 
     @cached_property
     def turning(self) -> Array:
@@ -84,15 +85,34 @@ class ContactMotion(Trajectory):
 
     @cached_property
     def slip(self) -> Array:
-        """(W, N+1, K, 2) displacement of the contacts along the table (t, o) since the start, less `rolled` [m]."""
-        return frozen(self.corner[..., :2] - self.corner[:, :1, :, :2] - self.rolled)
+        """(W, N+1, K, 2) displacement of the contacts along the table (t, o), less `rolled` [m].
+
+        Since the start, or since the first step in which a contact is to hold; 0 until then.
+        """
+        return frozen(self.since_held(self.corner[..., :2] - self.rolled))
+
+    def since_held(self, path: Array) -> Array:
+        """What has been added to a path (W, N+1, K, ...) of each contact since it is to hold; 0 until then."""
+        added = path - self.when_held(path)
+        if self.stance is None:
+            return added
+        held = np.logical_or.accumulate(self.standing, axis=1)
+        return np.where(np.concatenate([held[:, :1], held], axis=1)[..., None], added, 0.0)
+
+    def when_held(self, path: Array) -> Array:
+        """(W, 1, K, ...) a path (W, N+1, K, ...) of each contact at the first moment at which it is to hold."""
+        if self.stance is None:
+            return path[:, :1]
+        first = self.standing.argmax(axis=1)[:, None]
+        return np.take_along_axis(path, first[..., None], axis=1)
 
     @cached_property
     def friction_use(self) -> Array:
-        """(W, N, K) measured |f_t| / (mu f_n) with the world's mu, at 1 a contact slides; nan without a push."""
+        """(W, N, K) measured |f_t| / (mu f_n) with the world's mu, at 1 a contact slides; nan without a push and
+        where none is meant to hold."""
         tangential = np.linalg.norm(self.force_measured[..., :-1], axis=-1)
         normal = self.force_measured[..., -1]
-        pushed = normal > 0.0
+        pushed = (normal > 0.0) & self.standing
         return frozen(np.where(pushed, tangential, np.nan) / np.where(pushed, self.world.mu * normal, 1.0))
 
     @cached_property

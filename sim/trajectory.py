@@ -18,6 +18,7 @@ from pivoting.sim.pipeline.plan_log import Event, PlanLog
 from pivoting.sim.pipeline.stages import ANGULAR_VELOCITY, ORIENTATION, POSITION, VELOCITY
 from pivoting.sim.scenarios.relative_values import Load
 from pivoting.sim.scenarios.scenario import Scenario
+from pivoting.sim.stances import Stance
 from pivoting.sim.world import World
 
 Array = NDArray[np.float64]
@@ -54,6 +55,8 @@ class Trajectory:
         log: the output of every stage.
         wall_s: of the loop.
         plan: that was played in open loop, else None.
+        stances: the sets of contacts that are to hold, one after another.
+        stance: (W, N) the number of that which a world is in at each step; None, where there is one.
         plans: of a receding horizon, what came of each; else None.  events: what a user has to know of.
         engine_warnings: what MuJoCo warned of, as of a world that diverges: each once, with its first time.
         python_objects: which of controller, control and observe were handed to `simulate`.
@@ -72,6 +75,8 @@ class Trajectory:
     log: Log
     wall_s: float
     plan: Plan | None
+    stances: tuple[Stance, ...]
+    stance: NDArray[np.int8] | None
     plans: PlanLog | None
     events: tuple[Event, ...]
     engine_warnings: tuple[str, ...]
@@ -166,6 +171,14 @@ class Trajectory:
     def force_measured(self) -> Array:
         """(W, N, K, d) by MuJoCo's contacts, likewise."""
         return frozen(self.log.contacts.force @ (self.table_axes @ self.space.force_map))
+
+    @cached_property
+    def standing(self) -> NDArray[np.bool_]:
+        """(W, N, K) which contacts are to hold in each step."""
+        held = np.array([stance.held for stance in self.stances])
+        if self.stance is None:
+            return np.broadcast_to(held[0], (*self.log.control_ns.shape, len(held[0])))[None].repeat(self.worlds, 0)
+        return held[self.stance]
 
     @property
     def residual(self) -> Array:

@@ -65,7 +65,8 @@ class World:
     @property
     def radius(self) -> Array:
         """(K,) of what rolls, else 0 [m]."""
-        return self.placement.radius
+        more = len(self.declared.points) - len(self.placement.radius)
+        return np.concatenate([self.placement.radius, np.zeros(more)])
 
     @property
     def turn(self) -> tuple[Array, Array]:
@@ -121,9 +122,11 @@ def _instrumented(scene: Scene) -> tuple[mujoco.MjModel, dict[str, slice]]:
 def _declared(model: mujoco.MjModel, truth: RigidBody, there: Placement, case: Scenario) -> Declared:
     """The contacts that are to stick, in the world as it is."""
     table, lift = matrix(truth.table), space(truth.dim).lift
+    landing = there.landing if case.landing == "held" else np.zeros((0, 3))
+    radius = np.concatenate([there.radius, np.zeros(len(landing))])
     return Declared(
-        points=np.array([lift(truth.point(contact)) for contact in there.contacts]),
-        up=there.radius[:, None] * table[:, 2],
+        points=np.array([lift(truth.point(contact)) for contact in (*there.contacts, *landing)]),
+        up=radius[:, None] * table[:, 2],
         across=np.ascontiguousarray(table[:, : truth.dim - 1].T),
         near=float(NEAR * body_size(model, truth.index)),
         landing=case.limits.contacts_end > 0,

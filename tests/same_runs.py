@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from pivoting.controller.planning.sequential_convex import Plan
+from pivoting.controller.wrench_controller import WrenchController
 from pivoting.sim import Run
 from pivoting.sim.console.json_values import jsonable
 from pivoting.sim.drawing.recording_id import digest
@@ -39,6 +40,8 @@ def assert_equal(a: Any, b: Any, name: str, read_only: bool = True) -> None:
         assert len(a) == len(b), name
         for i, (one, other) in enumerate(zip(a, b, strict=True)):
             assert_equal(one, other, f"{name}.{getattr(a, '_fields', range(len(a)))[i]}", read_only)
+    elif isinstance(a, WrenchController):
+        assert_equal(a.belief, b.belief, name, read_only=False)
     elif isinstance(a, Plan):
         for each in fields(Plan):
             if each.name != "program":

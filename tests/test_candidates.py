@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 from pivoting.models.placement import contact_candidates as candidates
-from pivoting.models.placement.contact_candidates import Stance, contact_points, stance, support_points
+from pivoting.models.placement.contact_candidates import Pivot, contact_points, find_pivot, support_points
 from pivoting.models.rigid_body import ModelError, matrix
 
 POINTS = np.random.default_rng(3).normal(size=(14, 3)) * [0.1, 0.15, 0.2]
@@ -55,7 +55,7 @@ def turned(axis: np.ndarray, angle: float) -> np.ndarray:
     return matrix(quaternion)
 
 
-def strays(model: mujoco.MjModel, at: Stance, theta: float) -> tuple[int, int]:
+def strays(model: mujoco.MjModel, at: Pivot, theta: float) -> tuple[int, int]:
     """At `theta`: at how many of the points MuJoCo finds contacts, and how many off them and the edge between them."""
     data = mujoco.MjData(model)
     R = turned(at.axis, theta) @ at.rotation
@@ -75,9 +75,9 @@ def test_within_the_range_mujoco_touches_at_the_points_alone(body: str, contact:
     model = model_of(BODIES[body])
     if body in ("cylinder", "bottle", "pill", "skittle", "mallet") and contact == "edge":
         with pytest.raises(ModelError, match="contact = 'edge': body 'thing' lies on no face"):
-            stance(model, 1, contact)
+            find_pivot(model, 1, contact)
         return
-    at = stance(model, 1, contact)
+    at = find_pivot(model, 1, contact)
     end = at.range[1]
     assert at.range[0] == 0.0
     assert len(at.points) == 2 if contact == "edge" else len(at.points) in (1, 2)
@@ -93,7 +93,7 @@ def test_within_the_range_mujoco_touches_at_the_points_alone(body: str, contact:
 @pytest.mark.parametrize("body", BODIES)
 def test_at_balance_the_com_is_above_the_points(body: str) -> None:
     model = model_of(BODIES[body])
-    at = stance(model, 1, "vertex")
+    at = find_pivot(model, 1, "vertex")
     lever = turned(at.axis, at.balance) @ at.rotation @ (model.body_ipos[1] - at.points[0])
     assert lever[2] > 0.0
     assert np.cross(at.axis, [0.0, 0.0, 1.0]) @ lever == pytest.approx(0.0, abs=1e-9)
@@ -103,46 +103,46 @@ def test_at_balance_the_com_is_above_the_points(body: str) -> None:
 
 
 def test_known_numbers() -> None:
-    box = stance(model_of('<geom type="box" size=".1 .2 .2"/>'), 1, "edge")
+    box = find_pivot(model_of('<geom type="box" size=".1 .2 .2"/>'), 1, "edge")
     assert (box.range[1], box.balance) == pytest.approx((np.pi / 2.0, np.arctan(2.0)), abs=1e-12)
-    cube = stance(model_of('<geom type="box" size=".1 .1 .1"/>'), 1, "edge")
+    cube = find_pivot(model_of('<geom type="box" size=".1 .1 .1"/>'), 1, "edge")
     np.testing.assert_allclose(cube.points, [[-0.1, -0.1, -0.1], [-0.1, 0.1, -0.1]])
     np.testing.assert_allclose(cube.rotation, np.eye(3), atol=1e-12)
-    tetrahedron = stance(model_of(BODIES["tetrahedron"]), 1, "edge")
+    tetrahedron = find_pivot(model_of(BODIES["tetrahedron"]), 1, "edge")
     assert tetrahedron.range[1] == pytest.approx(np.pi - np.arccos(1.0 / 3.0))
-    rim = stance(model_of(BODIES["cylinder"]), 1, "vertex")
+    rim = find_pivot(model_of(BODIES["cylinder"]), 1, "vertex")
     assert (rim.range[1], rim.balance) == pytest.approx((np.pi / 2.0, np.arctan(0.5)))
-    bottle = stance(model_of(BODIES["bottle"]), 1, "vertex")  # on the side of the rim that the CoM is on
+    bottle = find_pivot(model_of(BODIES["bottle"]), 1, "vertex")  # on the side of the rim that the CoM is on
     com = model_of(BODIES["bottle"]).body_ipos[1]
     assert bottle.balance == pytest.approx(np.arctan((0.015 - com[1]) / (0.14 + com[2])))
-    slanted = stance(model_of(BODIES["offset"]), 1, "edge")
+    slanted = find_pivot(model_of(BODIES["offset"]), 1, "edge")
     assert slanted.range[1] == pytest.approx(np.pi / 2.0, abs=1e-12)
     cap = '<geom type="box" size=".1 .1 .1"/><geom type="sphere" size=".1" pos=".1 0 .3"/>'
-    ball = stance(model_of(cap), 1, [[0.1, 0.1, -0.1], [0.1, -0.1, -0.1]])  # it lies on z = -0.1, the ball .4 above
+    ball = find_pivot(model_of(cap), 1, [[0.1, 0.1, -0.1], [0.1, -0.1, -0.1]])  # it lies on z = -0.1, the ball .4 above
     assert ball.range[1] == pytest.approx(np.pi / 2.0 - np.arcsin(0.1 / 0.4))
 
 
 @pytest.mark.parametrize("body", ["offset", "irregular", "ell", "bottle", "stool", "ball on a box"])
 @pytest.mark.parametrize("contact", ["vertex", "edge"])
 def test_the_body_frame_does_not_matter(body: str, contact: str) -> None:
-    """The same geoms elsewhere in the body frame: the same stance, up to which of equals is chosen."""
+    """The same geoms elsewhere in the body frame: the same pivot, up to which of equals is chosen."""
     if (body, contact) == ("bottle", "edge"):
         return
-    first = stance(model_of(BODIES[body]), 1, contact)
+    first = find_pivot(model_of(BODIES[body]), 1, contact)
     moved = model_of(BODIES[body], 'pos=".4 .5 -.6" euler="70 -20 130"')
-    second = stance(moved, 1, contact)
+    second = find_pivot(moved, 1, contact)
     assert second.range[1] == pytest.approx(first.range[1], abs=1e-5)
     assert second.balance == pytest.approx(first.balance, abs=1e-5)
     R, frame = np.empty((3, 3)), model_of('<geom type="box" size="1 1 1"/>', 'pos=".4 .5 -.6" euler="70 -20 130"')
     R = matrix(frame.geom_quat[1])
-    again = stance(moved, 1, first.points @ R.T + frame.geom_pos[1])
+    again = find_pivot(moved, 1, first.points @ R.T + frame.geom_pos[1])
     np.testing.assert_allclose(again.points, (first.points @ R.T + frame.geom_pos[1])[:: _order(again, first, R)])
     assert again.range[1] == pytest.approx(first.range[1], abs=1e-5)
     if _order(again, first, R) == 1:
         np.testing.assert_allclose(again.rotation @ R, first.rotation, atol=1e-5)
 
 
-def _order(a: Stance, b: Stance, R: np.ndarray) -> int:
+def _order(a: Pivot, b: Pivot, R: np.ndarray) -> int:
     """-1 if the ends of the edge are in the other order."""
     return 1 if (a.points[-1] - a.points[0]) @ R @ (b.points[-1] - b.points[0]) >= 0.0 else -1
 
@@ -154,7 +154,7 @@ def test_lowest_keeps_the_orientation(body: str) -> None:
     for _ in range(10):
         xquat = rng.normal(size=4)
         xquat /= np.linalg.norm(xquat)
-        at = stance(model, 1, "lowest", xquat, table)
+        at = find_pivot(model, 1, "lowest", xquat, table)
         now = matrix(table).T @ matrix(xquat)
         np.testing.assert_allclose(turned(at.axis, at.start) @ at.rotation, now, atol=1e-9)
         assert 0.0 < at.start < at.range[1]
@@ -166,17 +166,17 @@ def test_lowest_keeps_the_orientation(body: str) -> None:
 def test_lowest_edge_and_lowest_when_balanced() -> None:
     model = model_of(BODIES["box"])
     tilted = np.array([np.cos(0.15), np.sin(0.15), 0.0, 0.0])
-    at = stance(model, 1, "lowest", tilted)
+    at = find_pivot(model, 1, "lowest", tilted)
     np.testing.assert_allclose(at.points, [[-0.1, -0.2, -0.3], [0.1, -0.2, -0.3]])
     assert (at.start, at.range[1]) == pytest.approx((0.3, np.pi / 2.0))
     cube = model_of('<geom type="box" size=".1 .1 .1"/>')
-    at = stance(cube, 1, "lowest", [np.cos(np.pi / 8.0), 0.0, np.sin(np.pi / 8.0), 0.0])
+    at = find_pivot(cube, 1, "lowest", [np.cos(np.pi / 8.0), 0.0, np.sin(np.pi / 8.0), 0.0])
     assert (at.start, at.balance, at.range[1]) == pytest.approx((np.pi / 4.0, np.pi / 4.0, np.pi / 2.0))
     up = np.ones(3) / np.sqrt(3.0)
     axis = np.cross(up, [0.0, 0.0, 1.0])
     xquat = np.empty(4)
     mujoco.mju_axisAngle2Quat(xquat, axis / np.linalg.norm(axis), np.arccos(up[2]))
-    at = stance(cube, 1, "lowest", xquat)
+    at = find_pivot(cube, 1, "lowest", xquat)
     np.testing.assert_allclose(at.points, [[-0.1, -0.1, -0.1]])
     assert at.balance == pytest.approx(at.start)
     assert strays(cube, at, at.start) == (1, 0)
@@ -184,14 +184,14 @@ def test_lowest_edge_and_lowest_when_balanced() -> None:
 
 
 def test_lowest_of_a_face_is_the_edge_that_the_com_is_closest_to() -> None:
-    at = stance(model_of(BODIES["ell"]), 1, "lowest")
+    at = find_pivot(model_of(BODIES["ell"]), 1, "lowest")
     np.testing.assert_allclose(at.points, [[-0.3, -0.1, -0.05], [0.3, -0.1, -0.05]])
     np.testing.assert_allclose(at.rotation, np.eye(3), atol=1e-9)
     assert at.start == pytest.approx(0.0, abs=1e-9)
 
 
 def test_ends_of_an_edge_between_two_rims_are_where_one_line_touches_both() -> None:
-    at = stance(model_of(BODIES["stool"]), 1, "lowest")
+    at = find_pivot(model_of(BODIES["stool"]), 1, "lowest")
     along = (at.points[1] - at.points[0]) / np.linalg.norm(at.points[1] - at.points[0])
     centres = np.array([[-0.3, -0.2, 0.0], [0.3, -0.2, 0.0]])
     np.testing.assert_allclose(np.linalg.norm(at.points - centres, axis=1), [0.03, 0.02])
@@ -200,7 +200,7 @@ def test_ends_of_an_edge_between_two_rims_are_where_one_line_touches_both() -> N
 
 def test_an_edge_that_is_not_quite_level_is_made_so() -> None:
     xquat = np.array([np.cos(0.15), np.sin(0.15), 5e-6, 0.0])
-    at = stance(model_of(BODIES["box"]), 1, "lowest", xquat / np.linalg.norm(xquat))
+    at = find_pivot(model_of(BODIES["box"]), 1, "lowest", xquat / np.linalg.norm(xquat))
     assert (at.rotation @ (at.points[1] - at.points[0]))[2] == pytest.approx(0.0, abs=1e-12)
     assert at.axis[2] == 0.0
 
@@ -208,7 +208,7 @@ def test_an_edge_that_is_not_quite_level_is_made_so() -> None:
 def test_it_lies_on_what_it_rests_on() -> None:
     """A heavy top that does not collide: upside down the CoM would be below the table, and on a side it tips over."""
     top = '<geom type="box" size=".3 .1 .1" pos="0 0 .5" mass="9" contype="0" conaffinity="0"/>'
-    at = stance(model_of('<geom type="box" size=".1 .1 .1" mass="1"/>' + top), 1, "edge")
+    at = find_pivot(model_of('<geom type="box" size=".1 .1 .1" mass="1"/>' + top), 1, "edge")
     np.testing.assert_allclose(at.rotation, np.eye(3), atol=1e-12)
 
 
@@ -219,10 +219,10 @@ def test_an_edge_above_which_the_com_can_be_brought() -> None:
         f'<mujoco><asset><mesh name="m" vertex="{sheared}"/></asset><worldbody><body><freejoint/>'
         '<geom type="mesh" mesh="m"/></body></worldbody></mujoco>'
     )
-    at = stance(model, 1, "edge")
+    at = find_pivot(model, 1, "edge")
     assert at.balance == pytest.approx(np.arctan(0.65 / 0.05), abs=1e-4)
     assert at.range[1] == pytest.approx(np.pi - np.arctan(1.0 / 3.0), abs=1e-4)
-    near = stance(model, 1, [[-0.0, -1.0, 0.0], [0.0, 1.0, 0.0]])
+    near = find_pivot(model, 1, [[-0.0, -1.0, 0.0], [0.0, 1.0, 0.0]])
     assert near.range[1] == pytest.approx(np.arctan(1.0 / 3.0), abs=1e-4)
 
 
@@ -230,7 +230,7 @@ def test_a_vertex_is_not_taken_for_the_edge_that_it_ends() -> None:
     """The CoM is above an edge: about its end, towards the CoM, the body would turn on all of the edge."""
     top = '<geom type="box" size=".1 .1 .1" pos="0 -.1 .5" mass="1000" contype="0" conaffinity="0"/>'
     model = model_of('<geom type="box" size=".1 .1 .1" mass="1e-6"/>' + top)
-    at = stance(model, 1, [-0.1, -0.1, -0.1])
+    at = find_pivot(model, 1, [-0.1, -0.1, -0.1])
     assert strays(model, at, 0.5 * at.range[1]) == (1, 0)
 
 
@@ -246,11 +246,11 @@ def test_a_rim_stays_put_only_about_its_tangent() -> None:
         geoms = "".join(part.format(f'pos="{" ".join(map(str, at))}"') for part, at in zip(parts, places, strict=True))
         model = model_of(geoms)
         if works:
-            at = stance(model, 1, "lowest", [1.0, 0.0, 0.0, 0.0])
+            at = find_pivot(model, 1, "lowest", [1.0, 0.0, 0.0, 0.0])
             np.testing.assert_allclose(at.points, [[0.0, 0.0, 0.0], [0.0, 0.5, 0.0]], atol=1e-12)
             assert strays(model, at, 0.5 * at.range[1]) == (2, 0)
         else:  # not about the line: about the rim's lowest point alone, sideways
-            at = stance(model, 1, "lowest", [1.0, 0.0, 0.0, 0.0])
+            at = find_pivot(model, 1, "lowest", [1.0, 0.0, 0.0, 0.0])
             assert len(at.points) == 1
             assert strays(model, at, 0.5 * at.range[1]) == (1, 0)
 
@@ -297,16 +297,16 @@ def test_what_touches() -> None:
 def test_contacts_given_by_hand() -> None:
     model = model_of(BODIES["box"])
     for given, end in (([0.1, 0.2, 0.3], np.pi / 2.0), ([[0.1, 0.2, 0.3], [0.1, -0.2, 0.3]], np.pi / 2.0)):
-        at = stance(model, 1, np.array(given) + 1e-4)
+        at = find_pivot(model, 1, np.array(given) + 1e-4)
         np.testing.assert_allclose(np.sort(at.points, axis=0), np.sort(np.atleast_2d(given), axis=0))
         assert at.range[1] == pytest.approx(end)
         np.testing.assert_allclose(at.rotation[2], [-1.0, 0.0, 0.0], atol=1e-12)  # the lowest CoM: on x = 0.1
     upright = model_of('<geom type="cylinder" size=".1 .2"/>')
-    at = stance(upright, 1, [0.06, 0.08, 0.2])
+    at = find_pivot(upright, 1, [0.06, 0.08, 0.2])
     np.testing.assert_allclose(at.rotation[0], [-0.6, -0.8, 0.0], atol=1e-9)
     assert strays(upright, at, 1.0) == (1, 0)
     for corner in contact_points(model_of(BODIES["irregular"]), 1):
-        at = stance(model_of(BODIES["irregular"]), 1, corner)
+        at = find_pivot(model_of(BODIES["irregular"]), 1, corner)
         assert strays(model_of(BODIES["irregular"]), at, 0.5 * at.range[1]) == (1, 0)
 
 
@@ -349,7 +349,7 @@ def test_contacts_given_by_hand() -> None:
 )
 def test_refusals(geoms: str, contact: object, words: str) -> None:
     with pytest.raises(ModelError, match=words):
-        stance(model_of(geoms), 1, contact)
+        find_pivot(model_of(geoms), 1, contact)
 
 
 def test_the_kind_that_was_refused_is_not_looked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -357,5 +357,5 @@ def test_the_kind_that_was_refused_is_not_looked_for_again(monkeypatch: pytest.M
     asked: list[object] = []
     monkeypatch.setattr(candidates, "search", lambda body, contact, *_: asked.append(contact) or iter(()))
     with pytest.raises(ModelError, match="contact = 'edge'"):
-        stance(model_of(BODIES["box"]), 1, "".join(["ed", "ge"]))
+        find_pivot(model_of(BODIES["box"]), 1, "".join(["ed", "ge"]))
     assert asked == ["edge", "edge", "vertex"]  # what is asked for, with and without its arc; then a way out

@@ -3,11 +3,11 @@
 import mujoco
 import numpy as np
 import pytest
-from pivoting.models.placement.contact_candidates import stance
+from pivoting.models.placement.contact_candidates import find_pivot
 from pivoting.models.placement.contact_search import search
 from pivoting.models.placement.convex_hull import read_hull
 from pivoting.models.placement.edge_grip import Grip, grip
-from pivoting.models.placement.tilt_range import Arc, Stance
+from pivoting.models.placement.tilt_range import Arc, Pivot
 from pivoting.models.rigid_body import read_body
 from scipy.spatial.transform import Rotation
 
@@ -26,7 +26,7 @@ def cloud(seed: int) -> mujoco.MjModel:
     )
 
 
-def ends_held(model: mujoco.MjModel, one: Stance, theta: float, deeper: int) -> int:
+def ends_held(model: mujoco.MjModel, one: Pivot, theta: float, deeper: int) -> int:
     """At how many ends of an edge MuJoCo makes contacts, that of index `deeper` being the deeper one."""
     data = mujoco.MjData(model)
     turned = Rotation.from_rotvec(theta * one.axis) * Rotation.from_matrix(one.rotation)
@@ -62,6 +62,6 @@ def test_an_edge_that_is_held_whichever_end_is_deeper_is_taken_first() -> None:
     for seed in range(30, 60):
         model = cloud(seed)
         held = grip(model, read_body(model, "box"), ARC)
-        assert held(stance(model, 1, "edge", arc=ARC, gripped=held)) is Grip.FIRM
-        passed_over += held(stance(model, 1, "edge", arc=ARC)) is Grip.ONE_SIDED
+        assert held(find_pivot(model, 1, "edge", arc=ARC, gripped=held)) is Grip.FIRM
+        passed_over += held(find_pivot(model, 1, "edge", arc=ARC)) is Grip.ONE_SIDED
     assert passed_over > 0

@@ -305,7 +305,7 @@ def test_in_space(name: str, tmp_path: Path) -> None:
     scale = np.linalg.norm(weight) / (run.truth.mass * np.linalg.norm(run.truth.gravity))
     k = steps(entities["/world/wrench/force"])
     moment = one_each(entities["/world/wrench/moment"]["Arrows3D:vectors"])
-    lever = np.linalg.norm(run.points.mean(axis=0))
+    lever = np.linalg.norm(run.points[run.stances[0].held].mean(axis=0))
     assert np.allclose(force, scale * run.wrench_world[0, k, :3], atol=1e-5)
     assert np.allclose(moment, scale / lever * run.wrench_world[0, k, 3:], atol=1e-5)
     centre = one_each(entities["/world/wrench"]["Transform3D:translation"])

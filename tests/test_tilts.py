@@ -8,7 +8,7 @@ import pytest
 from pivoting.models.errors import ModelError
 from pivoting.models.placement.contact_search import search
 from pivoting.models.placement.convex_hull import Hull, read_hull
-from pivoting.models.placement.tilt_range import LEAST, Arc, Stance
+from pivoting.models.placement.tilt_range import LEAST, Arc, Pivot
 from scipy.spatial.transform import Rotation
 
 from tests.tilt_oracle import STEP, Array, Shape, edge_range, rim_range, vertex_range
@@ -94,8 +94,8 @@ BODIES = [(kind, seed) for kind in KINDS for seed in range(3)]
 each_body = pytest.mark.parametrize(("kind", "seed"), BODIES, ids=lambda value: getattr(value, "__name__", str(value)))
 
 
-def numbers(shape: Shape, one: Stance) -> list[int]:
-    """Which of the shape's corners, balls and rims a stance is about."""
+def numbers(shape: Shape, one: Pivot) -> list[int]:
+    """Which of the shape's corners, balls and rims a pivot is about."""
     if one.radius[0] > 0.0:
         return [len(shape.corners) + int(np.linalg.norm(shape.balls - one.points[0], axis=1).argmin())]
     found = []

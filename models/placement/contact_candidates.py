@@ -18,11 +18,11 @@ from pivoting.models.placement.convex_hull import TOLERANCE, Hull, read_hull
 from pivoting.models.placement.edge_grip import Grip
 from pivoting.models.placement.given_contacts import Shown, as_compiled, held_by_hand, written
 from pivoting.models.placement.refusals import named, no_contact, not_held, option, out_of_range, within
-from pivoting.models.placement.tilt_range import Arc, Stance, interval
+from pivoting.models.placement.tilt_range import Arc, Pivot, interval
 
 TRIES = 400  # contacts among which a nearest one is looked for, or one beside which no other corner touches
-Gripped = Callable[[Stance], Grip]  # how the simulator holds it
-Misfit = Callable[[Stance], str]  # why it cannot be had where the body stands, or nothing
+Gripped = Callable[[Pivot], Grip]  # how the simulator holds it
+Misfit = Callable[[Pivot], str]  # why it cannot be had where the body stands, or nothing
 
 
 def contact_points(model: mujoco.MjModel, body_index: int) -> Array:
@@ -47,7 +47,7 @@ def support_points(model: mujoco.MjModel, body_index: int, down: ArrayLike, tole
     return read_hull(model, body_index, tolerance).support(up)[0]
 
 
-def stance(
+def find_pivot(
     model: mujoco.MjModel,
     body_index: int,
     contact: str | ArrayLike,
@@ -59,7 +59,7 @@ def stance(
     gripped: Gripped | None = None,
     misfit: Misfit = lambda one: "",
     shown: Shown = as_compiled,
-) -> Stance:
+) -> Pivot:
     """How to pivot a body about a contact.
 
     "vertex" and "edge" are the first that allow the arc: of the face on which it lies in the orientation that it has,
@@ -120,7 +120,7 @@ def _out_of_reach(
     return no_contact(body, contact, shown)
 
 
-def planar_stance(
+def find_planar_pivot(
     model: mujoco.MjModel,
     body_index: int,
     contact: str | ArrayLike,
@@ -134,7 +134,7 @@ def planar_stance(
     Args:
         contact: a corner or ball (3,), lowest at theta = 0, body frame [m]; any word is the left end of what is down.
         axes: (3, 3) object axes (u, o, v) as columns, body frame; theta = 0 has u along the table and v up.
-        arc, shown: as for `stance`.
+        arc, shown: as for `find_pivot`.
 
     Raises:
         ModelError: the point is none of these, what is lowest rolls and is no ball, or the arc is not allowed.
@@ -162,11 +162,9 @@ def planar_stance(
     return point, radius, high
 
 
-def _chosen(
-    found: Iterable[Stance], gripped: Gripped | None, misfit: Misfit
-) -> tuple[Stance | None, Stance | None, str]:
-    """The stance that is held best, the first of equals; the first that alternates; why the first does not fit."""
-    first: dict[Grip, Stance] = {}
+def _chosen(found: Iterable[Pivot], gripped: Gripped | None, misfit: Misfit) -> tuple[Pivot | None, Pivot | None, str]:
+    """The pivot that is held best, the first of equals; the first that alternates; why the first does not fit."""
+    first: dict[Grip, Pivot] = {}
     told = ""
     for tried, one in enumerate(found):
         if wrong := misfit(one):
@@ -182,7 +180,7 @@ def _chosen(
     return next((first[how] for how in Grip if how in first), None), alternating, told
 
 
-def _down(body: Hull, one: Stance) -> Array:
+def _down(body: Hull, one: Pivot) -> Array:
     """(P, 3) what touches at theta = 0."""
     up = one.rotation[2]
     try:
@@ -204,7 +202,7 @@ def _way_out(
     """The nearest contact that would do, or else the one with the widest range, as the end of a message."""
     asked = arc or Arc(0.0, 0.0)
     kinds = [kind for kind in ("edge", "vertex") if not (isinstance(contact, str) and contact == kind)]
-    some: Iterable[Stance] = chain(*(search(body, kind, arc, now) for kind in kinds))
+    some: Iterable[Pivot] = chain(*(search(body, kind, arc, now) for kind in kinds))
     if not isinstance(contact, str):
         at = np.atleast_2d(np.asarray(contact, dtype=float)).mean(axis=0)
         some = sorted(islice(some, TRIES), key=lambda one: float(np.linalg.norm(one.points.mean(axis=0) - at)))

@@ -6,13 +6,13 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from pivoting.models.frames import matrix
-from pivoting.models.placement.contact_candidates import planar_stance
+from pivoting.models.placement.contact_candidates import find_planar_pivot
 from pivoting.models.placement.contact_search import about, aside, of_no_face, on_face, spots
 from pivoting.models.placement.convex_hull import Hull, read_hull
 from pivoting.models.placement.edge_grip import Grip, grip
 from pivoting.models.placement.given_contacts import Shown, as_compiled, written
 from pivoting.models.placement.resting_faces import faces, promising, standing
-from pivoting.models.placement.tilt_range import LEAST, Stance
+from pivoting.models.placement.tilt_range import LEAST, Pivot
 from pivoting.models.rigid_body import RigidBody, initial_data
 
 
@@ -61,7 +61,7 @@ def contacts(
     longest: dict[str, float] = {}
     found: list[Candidate] = []
 
-    def listed(some: Iterable[Stance], face: int | None) -> None:
+    def listed(some: Iterable[Pivot], face: int | None) -> None:
         for one in some:
             contact, most = written(one.points, shown), one.range[1]
             if most < max(least, longest.get(contact, 0.0) + LEAST):
@@ -86,13 +86,13 @@ def contacts(
 def _planar(model: mujoco.MjModel, body: RigidBody, shown: Shown) -> Candidate:
     """The one contact of a body that moves in a plane."""
     axes = matrix(body.axes)
-    point, radius, most = planar_stance(model, body.index, "lowest", axes)
+    point, radius, most = find_planar_pivot(model, body.index, "lowest", axes)
     lever = (body.com - point) @ axes
     kind = "round end" if radius > 0.0 else "vertex"
     return Candidate(kind, written(point, shown), 1, most, float(np.arctan2(lever[0], lever[2])), radius)
 
 
-def _kind(hull: Hull, one: Stance) -> str:
+def _kind(hull: Hull, one: Pivot) -> str:
     """What a contact is called."""
     if len(one.points) == 2:
         return "edge"

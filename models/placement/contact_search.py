@@ -9,7 +9,7 @@ from pivoting.models.frames import Array
 from pivoting.models.placement.convex_hull import Hull, Indices
 from pivoting.models.placement.given_contacts import ALLOWED, Shown, as_compiled, held_by_hand
 from pivoting.models.placement.resting_faces import SAME, SLACK, Face, face, faces, middle, promising, standing
-from pivoting.models.placement.tilt_range import LARGE, LEAST, Arc, Held, Stance, cross, tilted, tilted_aside, touches
+from pivoting.models.placement.tilt_range import LARGE, LEAST, Arc, Held, Pivot, cross, tilted, tilted_aside, touches
 
 FACETS = 50  # of a hull, on which a wide range is looked for
 
@@ -21,8 +21,8 @@ def search(
     now: Array | None,
     shown: Shown = as_compiled,
     height: float = 0.0,
-) -> Iterator[Stance]:
-    """The contacts that are such and allow the arc, the first to be taken; see `contact_candidates.stance`."""
+) -> Iterator[Pivot]:
+    """The contacts that are such and allow the arc, the first to be taken; see `contact_candidates.find_pivot`."""
     least = LEAST if arc is None else max(LEAST, arc.least)
     if not isinstance(contact, str):
         found = _by_hand(body, held_by_hand(body, contact, shown), least, now)
@@ -36,7 +36,7 @@ def search(
     return (one for one in found if arc is None or arc.within(one.range[1]))
 
 
-def _tilts(body: Hull, kind: str, least: float, found: Iterable[Face], now: Array | None) -> Iterator[Stance]:
+def _tilts(body: Hull, kind: str, least: float, found: Iterable[Face], now: Array | None) -> Iterator[Pivot]:
     """About the edges, or vertices, of the hull: face by face, then vertices about other axes, then what is of no face.
 
     Of those with a range of less than `least` [rad] some are left out.
@@ -53,7 +53,7 @@ def _tilts(body: Hull, kind: str, least: float, found: Iterable[Face], now: Arra
         yield from about(body, held, up, least)
 
 
-def _lowest(body: Hull, least: float, now: Array) -> Iterator[Stance]:
+def _lowest(body: Hull, least: float, now: Array) -> Iterator[Pivot]:
     """About what touches the table, body to table axes `now` (3, 3): its edges, then its vertices."""
     points, owner = body.support(now[2])
     lies = face(body, now[2])
@@ -66,7 +66,7 @@ def _lowest(body: Hull, least: float, now: Array) -> Iterator[Stance]:
         yield from about(body, held_at(body, points[some], owner[some], now[2]), now[2], least, now)
 
 
-def _by_hand(body: Hull, held: Held, least: float, now: Array | None) -> Iterator[Stance]:
+def _by_hand(body: Hull, held: Held, least: float, now: Array | None) -> Iterator[Pivot]:
     """About one contact: as the body stands, if it does so on a face of that, then on its faces, then otherwise."""
     ups = (one.up for one in faces(body, body.facets_of(held.owner)) if touches(body, held, one.up))
     if now is not None and touches(body, held, now[2]) and face(body, now[2]) is not None:
@@ -81,7 +81,7 @@ def _by_hand(body: Hull, held: Held, least: float, now: Array | None) -> Iterato
         yield from about(body, same, up, least)
 
 
-def widest(body: Hull) -> Iterator[Stance]:
+def widest(body: Hull) -> Iterator[Pivot]:
     """About the edges and vertices of those faces about which the ranges can be widest."""
     rounded = (body.rank[body.facets] > 0).any(axis=1)
     for kind, bound in (("edge", body.bends), ("vertex", body.cones[body.facets])):
@@ -89,20 +89,20 @@ def widest(body: Hull) -> Iterator[Stance]:
             yield from on_face(body, one, kind, LEAST)
 
 
-def about(body: Hull, held: Held, up: Array, least: float, now: Array | None = None) -> Iterator[Stance]:
+def about(body: Hull, held: Held, up: Array, least: float, now: Array | None = None) -> Iterator[Pivot]:
     """About one contact on a table of normal `up`: as ever, then about another axis."""
     yield from filter(None, [tilted(body, held, up, now)])
     yield from aside(body, [held], up, least, now)
 
 
-def aside(body: Hull, some: Iterable[Held], up: Array, least: float, now: Array | None = None) -> Iterator[Stance]:
+def aside(body: Hull, some: Iterable[Held], up: Array, least: float, now: Array | None = None) -> Iterator[Pivot]:
     """About vertices on a table of normal `up`, about other axes; about a point of a rim as ever."""
     for held in some:
         rim = len(held.points) == 1 and body.rank[held.owner[0]] == 2
         yield from filter(None, [tilted(body, held, up, now) if rim else tilted_aside(body, held, up, least, now)])
 
 
-def on_face(body: Hull, on: Face, kind: str, least: float, now: Array | None = None) -> list[Stance]:
+def on_face(body: Hull, on: Face, kind: str, least: float, now: Array | None = None) -> list[Pivot]:
     """About the edges or vertices of a face, that to be taken first."""
     if kind == "vertex":
         some = [held for held in spots(body, on, least) if body.rank[held.owner[0]] != 2]

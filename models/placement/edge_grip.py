@@ -17,7 +17,7 @@ from pivoting.models.contact_softness import read_rows
 from pivoting.models.frames import Array, matrix, quaternion
 from pivoting.models.placement.convex_hull import body_size
 from pivoting.models.placement.given_contacts import NEAR
-from pivoting.models.placement.tilt_range import Arc, Stance, cross
+from pivoting.models.placement.tilt_range import Arc, Pivot, cross
 from pivoting.models.rigid_body import RigidBody, initial_data, place
 
 PROBE = 1e-5  # of the body's size, how deep it is to make any contact
@@ -40,26 +40,26 @@ class Grip(Enum):
     ALTERNATING = "alternating"
 
 
-def grip(model: mujoco.MjModel, body: RigidBody, arc: Arc | None = None) -> Callable[[Stance], Grip]:
-    """What says of a stance how it is held.
+def grip(model: mujoco.MjModel, body: RigidBody, arc: Arc | None = None) -> Callable[[Pivot], Grip]:
+    """What says of a pivot how it is held.
 
     Args:
         model: of the body; it is not changed.
         body: that moves freely.
-        arc: over which they have to; by default over all of a stance's range.
+        arc: over which they have to; by default over all of a pivot's range.
     """
     model, data, table = copy.copy(model), initial_data(model), matrix(body.table)
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE  # it misses contacts of less than 1e-6 m
     turned, origin = data.xmat[body.index].reshape(3, 3).copy(), data.xpos[body.index].copy() - body.origin
     size, load = body_size(model, body.index), LOAD * body.mass * float(np.linalg.norm(body.gravity))
 
-    def touching(stance: Stance, theta: float, depth: float, leaning: float = 0.0) -> tuple[Array, Array]:
+    def touching(pivot: Pivot, theta: float, depth: float, leaning: float = 0.0) -> tuple[Array, Array]:
         """(C,) where along the edge, of its length, contacts are, and (C,) how far from it [m]."""
-        first, along = stance.points[0], stance.points[-1] - stance.points[0]
-        level = _rotation(stance.axis, theta) @ stance.rotation
+        first, along = pivot.points[0], pivot.points[-1] - pivot.points[0]
+        level = _rotation(pivot.axis, theta) @ pivot.rotation
         away = origin + turned @ first  # where the file has it, as far as the table goes
         at = body.origin + away + table @ level @ (0.5 * along)
-        at = at + (stance.radius[0] - depth - (at - body.origin) @ table[:, 2]) * table[:, 2]
+        at = at + (pivot.radius[0] - depth - (at - body.origin) @ table[:, 2]) * table[:, 2]
         length = float(np.linalg.norm(along))
         if leaning:
             across = cross(np.array([0.0, 0.0, 1.0]), level @ along / length)
@@ -69,20 +69,20 @@ def grip(model: mujoco.MjModel, body: RigidBody, arc: Arc | None = None) -> Call
         ours = [one.contact for one in contacts_of(model, data, body.index) if one.other == body.support]
         found = np.array([contact.pos for contact in ours if contact.dist < 0.0]).reshape(-1, 3)
         points = (found - data.xpos[body.index]) @ data.xmat[body.index].reshape(3, 3)
-        points = points + stance.radius[0] * stance.up(theta) - first
+        points = points + pivot.radius[0] * pivot.up(theta) - first
         share = np.clip(points @ along / max(length**2, 1e-300), 0.0, 1.0)
         return share, np.linalg.norm(points - share[:, None] * along, axis=1)
 
-    def held(stance: Stance) -> Grip:
-        ends = (0.02 * stance.range[1], 0.98 * stance.range[1])
+    def held(pivot: Pivot) -> Grip:
+        ends = (0.02 * pivot.range[1], 0.98 * pivot.range[1])
         if arc is not None:
             ends = (max(min(arc.theta, arc.theta_end), ends[0]), max(arc.theta, arc.theta_end))
-        touching(stance, ends[1], PROBE * size)
+        touching(pivot, ends[1], PROBE * size)
         rows = read_rows(model, body.index, body.support, [data.qpos])
         depth = max(PROBE * size, 0.0 if rows is None else float(rows.depth(load)))
-        edge, crowded, one_sided = len(stance.points) == 2, False, False
+        edge, crowded, one_sided = len(pivot.points) == 2, False, False
         for theta in np.linspace(*ends, 2 + int((ends[1] - ends[0]) / STEP)):
-            found = [touching(stance, theta, depth, leaning) for leaning in ((-LEANING, LEANING) if edge else (0.0,))]
+            found = [touching(pivot, theta, depth, leaning) for leaning in ((-LEANING, LEANING) if edge else (0.0,))]
             apart = [share.max(initial=0.0) - share.min(initial=1.0) >= APART for share, _ in found]
             if edge and not any(apart):
                 return Grip.ALTERNATING

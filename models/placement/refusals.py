@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from pivoting.models.frames import Array
 from pivoting.models.placement.convex_hull import Hull
 from pivoting.models.placement.given_contacts import ALLOWED, Shown, as_compiled, written
-from pivoting.models.placement.tilt_range import Arc, Held, Stance, next_touch
+from pivoting.models.placement.tilt_range import Arc, Held, Pivot, next_touch
 
 
 def bounds(arc: Arc, most: float) -> tuple[float, float]:
@@ -67,7 +67,7 @@ def no_contact(body: Hull, contact: str | ArrayLike, shown: Shown = as_compiled)
     return f"{named(contact, shown)}: {tilted}{rolls}; must be {ALLOWED}"
 
 
-def not_held(body: Hull, contact: str | ArrayLike, edge: Stance, shown: Shown = as_compiled) -> str:
+def not_held(body: Hull, contact: str | ArrayLike, edge: Pivot, shown: Shown = as_compiled) -> str:
     """That the simulator does not hold an edge."""
     length = float(np.linalg.norm(edge.points[1] - edge.points[0]))
     whose = body.label[int(body.geom[edge.owner[0]])]

@@ -56,7 +56,7 @@ class Arc(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Stance:
+class Pivot:
     """Points of a body to pivot about. At theta = 0 it lies on more of itself, and theta > 0 lifts it off that.
 
     Attributes:
@@ -68,7 +68,7 @@ class Stance:
         balance: theta at which the CoM is straight above them, or, about an axis past which it leans, highest [rad].
         start: theta of the orientation that "lowest" is about, else 0 [rad].
         owner: of which ellipsoids of the hull the points are.
-        face: (P, 3) what touches at theta = 0, body frame [m]; in what `contact_candidates.stance` gives.
+        face: (P, 3) what touches at theta = 0, body frame [m]; in what `contact_candidates.find_pivot` gives.
     """
 
     points: Array
@@ -106,8 +106,8 @@ def touches(body: Hull, held: Held, up: Array) -> bool:
     return not bool(((body.rank[held.owner] == 2) & tilted & off).any())
 
 
-def tilted(body: Hull, held: Held, up: Array, now: Array | None = None, inward: Array | None = None) -> Stance | None:
-    """The stance about what is `held` on a table of normal `up`, or None if it cannot be tilted about that alone.
+def tilted(body: Hull, held: Held, up: Array, now: Array | None = None, inward: Array | None = None) -> Pivot | None:
+    """The pivot about what is `held` on a table of normal `up`, or None if it cannot be tilted about that alone.
 
     Args:
         held: one point, two corners or points of rims, or a ball, which touch there.
@@ -137,11 +137,11 @@ def tilted(body: Hull, held: Held, up: Array, now: Array | None = None, inward: 
     yaw = np.array([[x, -y, 0.0], [y, x, 0.0], [0.0, 0.0, 1.0]])
     balance, start = float(np.arctan2(lever @ t, lever @ n)), 0.0 if now is None else max(0.0, -low)
     turned = yaw @ np.stack([t, cross(n, t), n])
-    return Stance(points, np.full(len(points), radius), turned, -yaw[:, 1], (0.0, high - low), balance, start, owner)
+    return Pivot(points, np.full(len(points), radius), turned, -yaw[:, 1], (0.0, high - low), balance, start, owner)
 
 
-def tilted_aside(body: Hull, held: Held, up: Array, least: float, now: Array | None = None) -> Stance | None:
-    """The stance about one point with a range of at least `least` [rad] about another axis than that towards the CoM.
+def tilted_aside(body: Hull, held: Held, up: Array, least: float, now: Array | None = None) -> Pivot | None:
+    """The pivot about one point with a range of at least `least` [rad] about another axis than that towards the CoM.
 
     Of the directions that allow it, the one that is farthest from those that do not; of equal ones that closest to the
     CoM. None for a point of a rim, which stays put about its tangent alone.

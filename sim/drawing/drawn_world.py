@@ -131,7 +131,7 @@ class DrawnWorld:
     @property
     def planned_mu(self) -> Array:
         """(K,) friction that the controller may use, (1 - margin) mu."""
-        return self.run.attached.controller.belief.contacts.mu
+        return self.run.stances[-1].controllers[0].belief.contacts.mu
 
     @cached_property
     def corner(self) -> Array:
@@ -207,7 +207,7 @@ class DrawnWorld:
     def cone(self, i: int, *, planned: bool) -> tuple[Array, NDArray[np.int64], list[Array]]:
         """The friction cone of contact i, planned or the world's, in table axes [m]; see `shapes.cone`."""
         mu = float(self.planned_mu[i]) if planned else self.run.world.mu
-        floor = self.scale * self.run.attached.controller.contacts[i].f_min
+        floor = self.scale * self.run.stances[-1].controllers[0].contacts[i].f_min
         tall = 0.8 if self.dim == 2 else 0.45
         return cone(mu, floor * planned, max(tall * self.side / np.hypot(mu, 1.0), 1.3 * floor), self.dim)
 

@@ -14,7 +14,8 @@ def digest(run: "Run") -> str:
     """Twelve hexadecimal digits; the same for equal runs on any day, whatever was measured in them."""
     model = np.zeros(mujoco.mj_sizeModel(run.model), np.uint8)
     mujoco.mj_saveModel(run.model, None, model)
-    given = (model, run.points, run.world.radius, run.world.turn, run.reference, run.attached.controller.belief)
+    beliefs = tuple(controller.belief for stance in run.stances for controller in stance.controllers)
+    given = (model, run.points, run.world.radius, run.world.turn, run.reference, beliefs)
     case = run.scenario.absolute(run.load)
     words = (
         case.bounds(),

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.solution import FAILED, INACCURATE
 from pivoting.sim.judging.implicit_step import unseen
-from pivoting.sim.judging.predicted_slip import drift, why_unknown
+from pivoting.sim.judging.predicted_slip import RowEffects, drift, why_unknown
 
 if TYPE_CHECKING:
     from pivoting.sim.slip import ContactMotion
@@ -64,8 +64,9 @@ def measure(run: "ContactMotion") -> Measures:
     measured, predicted = run.force_measured[:, counted], run.force[:, counted]
     use = run.friction_use[:, steps]
     pushed = ~np.isnan(use)
-    height = run.corner[..., 2] - np.maximum(run.corner[:, :1, :, 2], 0.0)  # one with a margin is held above the table
-    lost = ~pushed.any(axis=2) | (height > LIFTED * run.size)[:, 1:][:, steps].any(axis=2)
+    began = np.maximum(run.when_held(run.corner)[..., 2], 0.0)  # one with a margin is held above the table
+    risen = (run.corner[..., 2] - began > LIFTED * run.size)[:, 1:] & run.standing
+    lost = ~pushed.any(axis=2) | risen[:, steps].any(axis=2)
     mismatch = _rms(np.linalg.norm(measured - predicted, axis=-1)) / _rms(np.linalg.norm(predicted, axis=-1))
     ever = pushed.any(axis=(1, 2))
     return Measures(
@@ -110,14 +111,24 @@ def predicted_slip(run: "ContactMotion") -> Array:
         return np.full(run.slip.shape, np.nan)
     point, omega = run.stepped[..., None, :], run.angular_velocity @ run.table_axes
     turning, touching = run.turning - point, run.lever - point
-    return drift(
-        run.world.contact_rows, run.log.held, turning, touching, run.stepped_velocity, omega, unseen(run), _settle(run)
+    path = drift(
+        run.world.contact_rows, _held(run), turning, touching, run.stepped_velocity, omega, unseen(run), _settle(run)
     )
+    return path if run.stance is None else run.since_held(path)
+
+
+def _held(run: "ContactMotion") -> RowEffects:
+    """What the rows do at the contacts; of one that is not to hold yet, nothing has to be known."""
+    held = run.log.held
+    if run.stance is None:
+        return held
+    give, slides = np.where(run.standing[..., None], held.give, 0.0), held.slides & run.standing
+    return held._replace(give=give, slides=slides)
 
 
 def slip_floor_unknown(run: "ContactMotion") -> str:
     """Why that cannot be predicted, in the first world where it cannot; "" where it can in all."""
-    found = why_unknown(run.world.contact_rows, run.log.held, run.time, _settle(run))
+    found = why_unknown(run.world.contact_rows, _held(run), run.time, _settle(run))
     told = [f"{why}{f' in world {world}' * (run.worlds > 1)}" for world, why in enumerate(found) if why]
     return told[0] if told else ""
 

@@ -42,7 +42,7 @@ class RowEffects(NamedTuple):
     Attributes:
         give: (..., K, 2) R_t f_t along the table (t, o) [m/s^2]; nan where no row holds the contact.
         above: (..., K) height of what the rows hold above what touches [m].
-        slides: (...) whether a contact is at the limit of its friction.
+        slides: (..., K) whether any part of the contact is at the limit of its friction.
     """
 
     give: Array
@@ -107,7 +107,7 @@ def dot(axis, x, y, z):  # type: ignore[no-untyped-def]
 
 @subroutine
 def begin_rows(sums):  # type: ignore[no-untyped-def]
-    """Clear the sums; no contact slides yet."""
+    """Clear the sums."""
     shared, total, alone, number = sums
     for i in range(3):
         shared[i] = 0.0
@@ -115,7 +115,6 @@ def begin_rows(sums):  # type: ignore[no-untyped-def]
         number[k] = 0.0
         for i in range(3):
             total[k, i] = alone[k, i] = 0.0
-    return False
 
 
 @subroutine
@@ -261,6 +260,6 @@ def _failure(of: RowEffects, settle: int) -> NDArray[np.int8]:
     free = np.isnan(of.give[..., 0])
     count = np.cumsum(free, axis=1)
     streak = count - np.maximum.accumulate(np.where(free, 0, count), axis=1)
-    failed = np.select([of.slides, free.all(axis=-1), (streak > UNHELD).any(axis=-1)], [1, 2, 3], 0)
+    failed = np.select([of.slides.any(axis=-1), free.all(axis=-1), (streak > UNHELD).any(axis=-1)], [1, 2, 3], 0)
     failed[:, :settle] = 0
     return np.asarray(failed, dtype=np.int8)

@@ -30,7 +30,7 @@ class ContactLog:
             *(np.empty((steps, worlds, *rest)) for rest in ((K, 3), (), (), (), ())),
         )
         self.held = RowEffects(
-            np.full((steps, worlds, K, 2), np.nan), np.zeros((steps, worlds, K)), np.zeros((steps, worlds), np.bool_)
+            np.full((steps, worlds, K, 2), np.nan), np.zeros((steps, worlds, K)), np.zeros((steps, worlds, K), np.bool_)
         )
 
     def sort(self, first: int, poses: Array, sensed: Array) -> None:

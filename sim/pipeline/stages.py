@@ -34,12 +34,14 @@ class States:
         values: (W, 13) position, orientation, velocity and angular velocity, in this order, as the properties say;
             more columns may follow, which are no part of the state.
         joint_position: (W, nq) and joint_velocity: (W, nv) of all joints of the model.
+        touching: (W,) how many contacts with its support the object has, as touch sensors would tell.
     """
 
-    __slots__ = ("joint_position", "joint_velocity", "values")
+    __slots__ = ("joint_position", "joint_velocity", "touching", "values")
 
-    def __init__(self, values: Array, joint_position: Array, joint_velocity: Array):
-        self.values, self.joint_position, self.joint_velocity = map(_shown, (values, joint_position, joint_velocity))
+    def __init__(self, values: Array, joint_position: Array, joint_velocity: Array, touching: Array):
+        self.values, self.touching = _shown(values), _shown(touching)
+        self.joint_position, self.joint_velocity = _shown(joint_position), _shown(joint_velocity)
 
     @property
     def position(self) -> Array:
@@ -63,18 +65,23 @@ class States:
 
     def copy(self) -> "States":
         """The same in arrays of their own, for whoever may keep them: those of the plant change with every step."""
-        return States(self.values[:, :STATE].copy(), self.joint_position.copy(), self.joint_velocity.copy())
+        return self.of(np.arange(len(self.values)))
+
+    def of(self, worlds: NDArray[np.intp]) -> "States":
+        """Those of some worlds, in arrays of their own."""
+        joints = self.joint_position[worlds], self.joint_velocity[worlds]
+        return States(self.values[worlds, :STATE], *joints, self.touching[worlds])
 
     def changed(self, values: Array) -> "States":
         """The same joints with other values (W, 13) of the object, as something measures or estimates it."""
-        return States(values, self.joint_position, self.joint_velocity)
+        return States(values, self.joint_position, self.joint_velocity, self.touching)
 
     @classmethod
     def turning(cls, orientation: Array, angular_velocity: Array) -> "States":
         """States of which only the rotation matters: orientations (W, 4) and angular velocities (W, 3)."""
         values = np.zeros((len(orientation), STATE))
         values[:, ORIENTATION], values[:, ANGULAR_VELOCITY] = orientation, angular_velocity
-        return cls(values, np.zeros((len(values), 0)), np.zeros((len(values), 0)))
+        return cls(values, np.zeros((len(values), 0)), np.zeros((len(values), 0)), np.zeros(len(values)))
 
 
 class Answers(NamedTuple):

@@ -50,7 +50,7 @@ class Scenario(ScenarioKeys):
         scene: name of an MJCF file in models/, or the path of one of your own.
         body, support: names of the object and of the geom that it stands on (None: what is under it).
         contact: what stays put: "corner" (planar scenes), "vertex", "edge", "lowest", or points (K, 3), body frame,
-            see `contact_candidates.stance`.
+            see `contact_candidates.find_pivot`.
         chosen: whether the object's own contact and solver parameters give way to those of the shipped scenes.
         about: "tilt" (theta lifts the object off its face) or "yaw" (with the CoM straight above the contact, theta
             turns it about the table's normal).

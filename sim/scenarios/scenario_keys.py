@@ -157,6 +157,12 @@ class ScenarioKeys:
     margin: float = key(
         1.0 / 6.0, "share of the friction that is kept unused", group=CONTROLLER, at_least=0.0, below=1.0
     )
+    landing: str = key(
+        "ignored",
+        "what follows once the object lies on its face",
+        group=REFERENCE,
+        words={"ignored": "nothing", "held": "all corners of the face are held, as a second stance"},
+    )
     f_min: float | str | None = key(
         0.0,
         "least normal force of each contact; for an object of your own, by default what keeps the contact closed",

@@ -25,7 +25,7 @@ def own_object(
     Args:
         model: MJCF file.
         body: name of a body that moves freely, or by two slides and a hinge; '#1' of one without a name.
-        contact: "vertex", "edge", "lowest", or points (K, 3) in the body frame [m]; see `contact_candidates.stance`.
+        contact: "vertex", "edge", "lowest", or points (K, 3) in the body frame [m]; see `contact_candidates.find_pivot`.
         support: name of the geom that it stands on, a plane, a box or an upright cylinder; None: what is under it.
         chosen: simulate it with the contact and solver parameters of the shipped scenes (`models/settings.xml`).
     """
@@ -158,13 +158,14 @@ SCENARIOS = {
         ),
         Scenario(
             "settle-3d",
-            "the block lowered about an edge until it lies on its face, without bouncing, in 2 s",
+            "the block lowered about an edge in 2 s until it lies on its face, without bouncing, and held there",
             scene="settle-3d",
             contact="edge",
             reference="arc",
             theta=20.0,
             theta_end=0.0,
             seconds=2.0,
+            landing="held",
             limits=replace(_SPATIAL, contacts_end=4),
         ),
     )
