@@ -25,7 +25,7 @@ def own_object(
     Args:
         model: MJCF file.
         body: name of a body that moves freely, or by two slides and a hinge; '#1' of one without a name.
-        contact: "vertex", "edge", "lowest", or points (K, 3) in the body frame [m]; see `contact_candidates.find_pivot`.
+        contact: "vertex", "edge", "lowest", or points (K, 3), body frame [m]; see `contact_candidates.find_pivot`.
         support: name of the geom that it stands on, a plane, a box or an upright cylinder; None: what is under it.
         chosen: simulate it with the contact and solver parameters of the shipped scenes (`models/settings.xml`).
     """
