@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pivoting.sim.engine_log import engine_log
 from pivoting.sim.experiment import freeze
-from pivoting.sim.fleet import SAMPLES, Array, Fleet, Handed, WorldSamples
+from pivoting.sim.fleet import SAMPLES, Fleet, Handed, WorldSamples
 from pivoting.sim.judging.advice import reasons, remedies
 from pivoting.sim.judging.findings import Findings, bounded_steps
 from pivoting.sim.judging.measures import Measures, slip_floor_unknown

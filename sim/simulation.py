@@ -276,7 +276,10 @@ def _times(case: Scenario, dt: float, worlds: int) -> Array:
         raise fail("seconds", case.duration, f"such that a world takes 2 to {MAX_STEPS} steps, at dt = {dt:g} s")
     if steps * worlds > MAX_STEPS:
         raise fail(
-            "worlds", worlds, f"at most {MAX_STEPS // steps}: of {steps} steps each, more are not kept in memory"
+            "worlds",
+            worlds,
+            f"at most {MAX_STEPS // steps}: of {steps} steps each, more are not kept in memory; or any number with"
+            " keep = 'measures'",
         )
     if steps * dt <= case.limits.settle_s:
         raise fail("seconds", case.duration, f"more than the {case.limits.settle_s:g} s that the verdict lets settle")
