@@ -16,7 +16,7 @@ from pivoting.sim.fleet import ReplayError
 from pivoting.sim.pipeline.own_control import Moment
 from pivoting.sim.scenarios.scenario_file import read
 
-from tests.own_files import FLOOR, mjcf, own
+from tests.own_files import mjcf, own
 from tests.processes import pivoting
 from tests.same_runs import assert_same
 
@@ -108,12 +108,13 @@ def test_the_cases_above_hold_what_they_are_to_compare(whole: tuple[Run, dict[st
 
 
 def test_what_else_is_touched_is_said_of_the_same_world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    wall = '<geom name="wall" type="box" size=".01 1 1" pos=".075 0 .5"/>'
-    case = own(tmp_path, mjcf(floor=FLOOR + wall), [[0.05, 0.04, -0.06], [0.05, -0.04, -0.06]])
-    run = simulate(case, 5, seed=1, spread=1.0)
-    assert "wall" in run.strays[0]
-    monkeypatch.setattr(chunks, "CHUNK", 2 * run.time.size)
-    fleet = simulate(case, 5, seed=1, spread=1.0, keep="measures")
+    ball = '<body name="ball" pos="0 0 .16"><freejoint/><geom name="ball" size=".02" mass="50"/></body>'
+    case = own(tmp_path, mjcf(world=ball))
+    run = simulate(case, 3, seed=3, spread=1.0)
+    assert "'ball'" in run.strays[0]
+    assert run.strays[0].endswith("in world 1")
+    monkeypatch.setattr(chunks, "CHUNK", 1)
+    fleet = simulate(case, 3, seed=3, spread=1.0, keep="measures")
     assert_same_measures(fleet, run)
     assert told(fleet) == told(run)
     assert fleet.strays == run.strays
@@ -142,7 +143,7 @@ def test_a_control_of_ones_own_is_told_of_its_worlds(monkeypatch: pytest.MonkeyP
     assert_same_measures(fleet, simulate("balance-2d", 5, control=Unsteady(True), first_world=10, seconds=0.6))
     assert fleet.replay(3).first_world == 13
     lasting = simulate("balance-2d", 5, control=Unsteady(False), seconds=0.6, keep="measures")
-    with pytest.raises(ReplayError, match="world = 0: run again its .* begin anew") as raised:
+    with pytest.raises(ReplayError, match=r"world = 0: run again its .* begin anew") as raised:
         lasting.replay(0)
     assert isinstance(raised.value, PivotingError)
 
@@ -226,13 +227,13 @@ def test_what_cannot_be_is_refused(fleet: Fleet, tmp_path: Path) -> None:
         simulate("pivot-2d", keep="some")
     with pytest.raises(ValueError, match="keep = 'measures': must be 'all' in open loop"):
         simulate("mpc-2d", open_loop=True, keep="measures")
-    with pytest.raises(ValueError, match="worlds = 100000: must be at most .* or any number with keep = 'measures'"):
+    with pytest.raises(ValueError, match=r"worlds = 100000: must be at most .* or any number with keep = 'measures'"):
         simulate("pivot-2d", 100_000)
     for world in (-1, 3, True, 0.5):
         with pytest.raises(ValueError, match=r"world = .*: must be a whole number in \[0, 3\)"):
             fleet.replay(world)
     (tmp_path / "a.json").write_text('{"scenario": "pivot-2d", "keep": "some"}')
-    with pytest.raises(ValueError, match="a.json: keep = 'some': must be one of"):
+    with pytest.raises(ValueError, match=r"a.json: keep = 'some': must be one of"):
         read(tmp_path / "a.json")
 
 
