@@ -6,6 +6,7 @@ from .controller.wrench_controller import WrenchController as WrenchController
 from .controller.wrench_problem import WrenchProblem as WrenchProblem
 from .errors import PivotingError as PivotingError
 from .sim.attachment import attach as attach
+from .sim.fleet import Fleet as Fleet
 from .sim.judging.assertions import assert_sticking as assert_sticking, assert_tracking as assert_tracking
 from .sim.run import Run as Run
 from .sim.saved_run import load as load

@@ -6,6 +6,7 @@ Each kind is defined where it arises, and is also a RuntimeError, a ValueError o
     pivoting.controller.validate    InputError: an argument that cannot be used
     pivoting.models.errors          ModelError: a MuJoCo model that cannot be served
     pivoting.sim.attachment         ControlError: a state of the simulation that cannot be controlled
+    pivoting.sim.fleet              ReplayError: a world that was run again is not what it was
     pivoting.sim.drawing            RecordingOffError, GraphicsError: no recordings are wanted, nothing can be rendered
 """
 

@@ -1,4 +1,6 @@
 from .attachment import Attached as Attached, ControlError as ControlError, attach as attach
+from .experiment import Experiment as Experiment
+from .fleet import Fleet as Fleet, ReplayError as ReplayError, WorldSamples as WorldSamples
 from .judging.assertions import assert_sticking as assert_sticking, assert_tracking as assert_tracking
 from .judging.verdict import Check as Check, Limits as Limits
 from .run import Run as Run

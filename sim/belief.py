@@ -34,6 +34,13 @@ class Believed(NamedTuple):
         """Of the first stance: one for each world, or one that they share."""
         return self.stances[0].controllers
 
+    def part(self, first: int, worlds: int) -> "Believed":
+        """The same for some of the worlds, from that with the index `first` on."""
+        if len(self.controllers) == 1:
+            return self
+        some = slice(first, first + worlds)
+        return self._replace(stances=tuple(Stance(each.held, each.controllers[some]) for each in self.stances))
+
 
 def believe(
     case: Scenario, read: Scene, worlds: int = 1, given: WrenchController | Sequence[WrenchController] | None = None

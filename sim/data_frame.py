@@ -10,6 +10,7 @@ from pivoting.sim.run_arrays import CONTACT_AXES, WRENCH
 
 if TYPE_CHECKING:
     import pandas
+    from pivoting.sim.fleet import Fleet
     from pivoting.sim.run import Run
 
 Array = NDArray[Any]
@@ -27,13 +28,7 @@ def data_frame(run: "Run") -> "pandas.DataFrame":
     Raises:
         ModuleNotFoundError: pandas is not installed.
     """
-    try:
-        import pandas
-    except ModuleNotFoundError as error:
-        if error.name != "pandas":
-            raise
-        told = "to_dataframe needs pandas, which is not installed; the extra has it: pip install 'pivoting[data]'"
-        raise ModuleNotFoundError(told, name="pandas") from None
+    pandas = _pandas()
     states, steps = np.arange(run.time.size), run.time.size - 1
     index = pandas.MultiIndex.from_product([np.arange(run.worlds), states], names=["world", "step"])
     columns = {name: _column(values, run.worlds, states.size) for name, values in _columns(run).items()}
@@ -42,6 +37,33 @@ def data_frame(run: "Run") -> "pandas.DataFrame":
     codes[:, :steps] = run.status
     frame["status"] = pandas.Categorical.from_codes(codes.ravel(), list(STATUS))
     return frame
+
+
+def fleet_frame(fleet: "Fleet") -> "pandas.DataFrame":
+    """A row for each world of a fleet: its measures, in the units that the columns' names end with, and `passed`.
+
+    The index is world, from 0.
+
+    Raises:
+        ModuleNotFoundError: pandas is not installed.
+    """
+    pandas = _pandas()
+    passed = np.isin(np.arange(fleet.worlds), fleet.failed_worlds, invert=True)
+    return pandas.DataFrame(
+        {**vars(fleet.measures), "passed": passed}, index=pandas.RangeIndex(fleet.worlds, name="world")
+    )
+
+
+def _pandas() -> Any:
+    """The module, which is imported when it is needed."""
+    try:
+        import pandas
+    except ModuleNotFoundError as error:
+        if error.name != "pandas":
+            raise
+        told = "to_dataframe needs pandas, which is not installed; the extra has it: pip install 'pivoting[data]'"
+        raise ModuleNotFoundError(told, name="pandas") from None
+    return pandas
 
 
 def _columns(run: "Run") -> dict[str, Array]:

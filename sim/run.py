@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.rotations import CONJUGATE, quaternion_product
+from pivoting.sim.judging.findings import Findings, find
 from pivoting.sim.judging.measures import Measures, measure
-from pivoting.sim.judging.summary import contact_figures, object_figures, summary
 from pivoting.sim.judging.undeclared_contacts import stray_words
-from pivoting.sim.judging.verdict import Check, Limits, judge, worst_world
 from pivoting.sim.slip import ContactMotion
 from pivoting.sim.trajectory import frozen
 
@@ -22,19 +21,12 @@ Array = NDArray[np.float64]
 
 
 class Run(ContactMotion):
-    """A closed-loop run; its arrays are those of `Trajectory` and `ContactMotion`."""
+    """A closed-loop run; its arrays are those of `Trajectory` and `ContactMotion`, its verdict that of `Experiment`."""
 
     @cached_property
     def measures(self) -> Measures:
         """What the monitor makes of it, for each world."""
         return measure(self)
-
-    @property
-    def limits(self) -> Limits:
-        """Of the verdict, with that on the slip in metres."""
-        return self.scenario.limits.for_object(
-            self.unit * self.size, self.unit * float(np.linalg.norm(self.truth.gravity))
-        )
 
     @cached_property
     def strays(self) -> list[str]:
@@ -42,38 +34,14 @@ class Run(ContactMotion):
         return stray_words(self)
 
     @cached_property
-    def checks(self) -> tuple[Check, ...]:
-        """The verdict, line by line."""
-        return judge(self.measures, self.limits, self.certified)
-
-    @property
-    def failed_worlds(self) -> NDArray[np.intp]:
-        """Indices of the worlds that fail any check."""
-        return np.flatnonzero(np.any([check.failed for check in self.checks], axis=0))
-
-    @cached_property
-    def worst_world(self) -> int:
-        """The one in which a measured value is the greatest multiple of its limit."""
-        return worst_world(self.checks, self.measures)
-
-    @property
-    def verdict(self) -> str:
-        """ "pass" if every world is within every limit of the scenario, else "fail"."""
-        return "fail" if self.failed_worlds.size else "pass"
-
-    @property
-    def object(self) -> dict[str, Any]:
-        """What was read of the object, as the world has it, in the frame that its file gives the body."""
-        return object_figures(self)
-
-    @property
-    def contact_settings(self) -> dict[str, Any]:
-        """The support's contact parameters in the world, and what they replaced of the file."""
-        return contact_figures(self)
+    def findings(self) -> Findings:
+        """What else there is to say of it."""
+        return find(self)
 
     def summary(self) -> dict[str, Any]:
         """The run in numbers, of the worst world, SI units in the keys; what `--json` prints."""
-        return summary(self)
+        played = {} if self.plan is None else {"plan_angle_error_max_deg": float(np.rad2deg(self.plan_error.max()))}
+        return {**super().summary(), **played}
 
     def save(self, folder: str | os.PathLike[str]) -> Path:
         """Keep the run in a folder, from which `pivoting.load` gets it back, and return that.

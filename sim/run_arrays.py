@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 Arrays = Mapping[str, Array]
+Meaning = tuple[str, str, str]  # dimensions, unit, what it is
 STATES = {"position": POSITION, "quaternion": ORIENTATION, "velocity": VELOCITY, "angular_velocity": ANGULAR_VELOCITY}
 WRENCH = {2: ("F_u", "F_v", "M"), 3: ("F_x", "F_y", "F_z", "M_x", "M_y", "M_z")}  # by dimension, object axes
 CONTACT_AXES = {2: ("t", "n"), 3: ("t", "o", "n")}
@@ -119,12 +120,18 @@ def described(run: "Run") -> dict[str, Variable]:
     dim, arrays = run.truth.dim, named_arrays(run)
     arrays |= {name: np.array(names) for name, names in _NAMES.items()}
     arrays |= {"component": np.array(WRENCH[dim]), "contact_axis": np.array(CONTACT_AXES[dim])}
-    return {name: _described(name, values, run.unit) for name, values in arrays.items()}
+    return {name: variable(name, values, run.unit) for name, values in arrays.items()}
 
 
-def _described(name: str, values: Array, unit: float) -> Variable:
-    dims, units, meaning = _MEANINGS.get(name, (name, "", ""))
-    attributes: dict[str, Any] = {"long_name": meaning, "units": in_unit(units, unit)}
+def meaning_of(name: str) -> Meaning:
+    """Of an array of a run's file; of what is not listed, as the names of components, only its own dimension."""
+    return _MEANINGS.get(name, (name, "", ""))
+
+
+def variable(name: str, values: Array, unit: float = 1.0, meaning: Meaning | None = None) -> Variable:
+    """An array as a file has it, of a model whose unit of length is `unit` [m]; its meaning by its name, or another."""
+    dims, units, what = meaning or meaning_of(name)
+    attributes: dict[str, Any] = {"long_name": what, "units": in_unit(units, unit)}
     if name in _WORDS:
         words = [word.replace(" ", "_") for word in _WORDS[name]]
         attributes |= {"flag_values": np.arange(len(words), dtype=np.int8), "flag_meanings": " ".join(words)}

@@ -17,14 +17,16 @@ from pivoting.controller.validate import InputError
 from pivoting.controller.wrench_controller import WrenchController
 from pivoting.models.errors import ModelError
 from pivoting.sim.drawing.recording_id import digest
-from pivoting.sim.netcdf import read_netcdf, write_netcdf
+from pivoting.sim.fleet import Fleet
+from pivoting.sim.fleet_arrays import fleet_described, fleet_of, fleet_outcome
+from pivoting.sim.netcdf import Variable, read_netcdf, write_netcdf
 from pivoting.sim.pipeline.plan_log import Event
 from pivoting.sim.run import Run
 from pivoting.sim.run_arrays import Arrays, described, log_of, plan_of, plans_of
+from pivoting.sim.run_setup import Begun, set_up
 from pivoting.sim.scenario_horizon import scenario_horizon
 from pivoting.sim.scenarios.scenario import Scenario
 from pivoting.sim.scenarios.scenario_file import ScenarioFile, expressible, read, written
-from pivoting.sim.simulation import Begun, set_up
 from pivoting.sim.whole_files import Writer, write_together
 
 SCENARIO, ARRAYS = "scenario.json", "run.nc"  # the files of a run that has a folder to itself
@@ -32,14 +34,14 @@ VERSIONS = {"pivoting": __version__, "mujoco": mujoco.__version__, "numpy": np._
 _PLAN = sorted({each.name for each in fields(Plan)} - {"program", "desired", "guess"})  # what of a plan is no array
 
 
-def save(run: Run, folder: str | os.PathLike[str]) -> Path:
+def save(run: Run | Fleet, folder: str | os.PathLike[str]) -> Path:
     """Write a run into a folder and return it; see `Run.save`."""
     folder = Path(folder)
     write_together(folder, run_files(run, ARRAYS, SCENARIO))
     return folder
 
 
-def run_files(run: Run, arrays: str, scenario: str) -> dict[str, Writer]:
+def run_files(run: Run | Fleet, arrays: str, scenario: str) -> dict[str, Writer]:
     """The writers of a run's two files, by the names that these are to have.
 
     The arrays are written first, for the scenario's file says how long their file is, and what its digest is.
@@ -48,8 +50,9 @@ def run_files(run: Run, arrays: str, scenario: str) -> dict[str, Writer]:
     kept: dict[str, Any] = {}
 
     def write_arrays(part: Path) -> None:
-        texts = {"title": run.scenario.label, "scenario": json.dumps(said), "outcome": json.dumps(_outcome(run))}
-        write_netcdf(part, described(run), {**texts, "coordinates": "time step_time"})  # xarray knows which are
+        variables, outcome = _kept(run)
+        texts = {"title": run.scenario.label, "scenario": json.dumps(said), "outcome": json.dumps(outcome)}
+        write_netcdf(part, variables, {**texts, "coordinates": "time step_time"})  # xarray knows which are
         kept.update(file=arrays, **_fingerprint(part))
 
     def write_scenario(part: Path) -> None:
@@ -58,7 +61,7 @@ def run_files(run: Run, arrays: str, scenario: str) -> dict[str, Writer]:
     return {arrays: write_arrays, scenario: write_scenario}
 
 
-def description(run: Run) -> ScenarioFile:
+def description(run: Run | Fleet) -> ScenarioFile:
     """What the scenario's file says of a run, but for its arrays."""
     case = run.scenario
     return ScenarioFile(
@@ -66,7 +69,8 @@ def description(run: Run) -> ScenarioFile:
         run.worlds,
         run.seed,
         run.first_world,
-        open_loop=run.plan is not None,
+        open_loop=run.open_loop,
+        keep="all" if isinstance(run, Run) else run.keep,
         python_objects=(*run.python_objects, *([] if expressible(case) else ["scenario"])),
         digest=digest(run),
         versions=VERSIONS,
@@ -89,8 +93,10 @@ def _different(a: Mapping[str, Any], b: Mapping[str, Any], but: tuple[str, ...])
 
 def load(
     folder: str | os.PathLike[str], *, scenario: Scenario | None = None, controller: WrenchController | None = None
-) -> Run:
+) -> Run | Fleet:
     """The run that `Run.save` or `pivoting run --out` kept: the same arrays bit for bit, measures and verdict.
+
+    Where only measures were kept it is the `Fleet`.
 
     World and belief are set up again from the scenario, which takes a model of one's own from where it was.
 
@@ -116,14 +122,18 @@ def load(
             raise InputError(f"{path}: the run's {name} {told}; must be {'given' if given is None else 'left out'}")
     arrays, said, outcome = _read_arrays(path, file.arrays)
     case = scenario or file.scenario
-    counts = {"worlds": file.worlds, "seed": file.seed, "first_world": file.first_world}
+    counts: dict[str, int] = {"worlds": file.worlds, "seed": file.seed, "first_world": file.first_world}
     try:
-        begun = set_up(case, controller, **counts)
+        begun = set_up(case, controller, keep=file.keep, **counts)
     except ValueError as error:
         kind = ModelError if isinstance(error, ModelError) else InputError
         raise kind(f"{path}: cannot be set up again: {error}") from None
     try:
-        run = _restored(begun, arrays, outcome, file.python_objects)
+        objects = tuple(name for name in file.python_objects if name != "scenario")
+        if file.keep == "all":
+            run: Run | Fleet = _restored(begun, arrays, outcome, objects)
+        else:
+            run = fleet_of(begun, arrays, outcome, objects, controller)
     except KeyError as error:
         raise InputError(f"{path.parent / file.arrays['file']}: has no {error.args[0]}") from None
     _check(path, run, said)
@@ -160,11 +170,11 @@ def _restored(begun: Begun, arrays: Arrays, outcome: Mapping[str, Any], python_o
         plans=plans_of(arrays),
         events=tuple(Event(*event) for event in outcome["events"]),
         engine_warnings=tuple(outcome["engine_warnings"]),
-        python_objects=tuple(name for name in python_objects if name != "scenario"),
+        python_objects=python_objects,
     )
 
 
-def _check(path: Path, run: Run, said: Mapping[str, Any]) -> None:
+def _check(path: Path, run: Run | Fleet, said: Mapping[str, Any]) -> None:
     """Refuse a run that is not the one that was saved."""
     now = json.loads(json.dumps(written(description(run))))
     other = _different(said, now, ("model", "versions"))
@@ -177,6 +187,11 @@ def _check(path: Path, run: Run, said: Mapping[str, Any]) -> None:
         )
     if other:
         raise InputError(f"{path}: {', '.join(other)} must be as in the run that was saved")
+
+
+def _kept(run: Run | Fleet) -> tuple[dict[str, Variable], dict[str, Any]]:
+    """The arrays of a run or a fleet as their file has them, and what came of it beside them."""
+    return (described(run), _outcome(run)) if isinstance(run, Run) else (fleet_described(run), fleet_outcome(run))
 
 
 def _outcome(run: Run) -> dict[str, Any]:

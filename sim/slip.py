@@ -4,7 +4,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.controller.units import lever
 from pivoting.models.frames import matrix
 from pivoting.sim.judging.predicted_slip import stepped_point
 from pivoting.sim.trajectory import Trajectory, frozen
@@ -16,20 +15,9 @@ class ContactMotion(Trajectory):
     """How the contacts of a run move; the material points of the object, for what sticks is they."""
 
     @property
-    def points(self) -> Array:
-        """(K, 3) the contact points, or centres of what rolls, from the CoM, object axes [m]."""
-        return self.world.declared.points
-
-    @property
     def contacts_found(self) -> Array:
         """(W, N) contacts between the body and its support, as MuJoCo counts them."""
         return self.log.contacts.found
-
-    @property
-    def size(self) -> float:
-        """Lever from the CoM to the contacts [m], against which lengths are judged."""
-        first = self.stances[0].held
-        return lever(self.points[first]) + float(np.mean(self.world.radius[first]))
 
     @cached_property
     def turning(self) -> Array:

@@ -2,24 +2,16 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.plane_and_space import Space, space
 from pivoting.controller.planning.sequential_convex import Plan
 from pivoting.controller.rotations import CONJUGATE, quaternion_product, rotated
 from pivoting.models.frames import matrix
-from pivoting.models.rigid_body import RigidBody
-from pivoting.sim.attachment import Attached
+from pivoting.sim.experiment import Experiment
 from pivoting.sim.pipeline.log import Log
-from pivoting.sim.pipeline.plan_log import Event, PlanLog
 from pivoting.sim.pipeline.stages import ANGULAR_VELOCITY, ORIENTATION, POSITION, VELOCITY
-from pivoting.sim.scenarios.relative_values import Load
-from pivoting.sim.scenarios.scenario import Scenario
-from pivoting.sim.stances import Stance
-from pivoting.sim.world import World
 
 Array = NDArray[np.float64]
 
@@ -30,90 +22,23 @@ def frozen(values: Array) -> Array:
     return values
 
 
-def _freeze(values: Any) -> None:
-    if isinstance(values, np.ndarray):
-        values.flags.writeable = False
-    elif isinstance(values, tuple):
-        for value in values:
-            _freeze(value)
-
-
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(Experiment):
     """A closed-loop run, W worlds and N steps. States have N + 1 entries, answers N; all read-only.
 
     Attributes:
-        scenario: what was run, overrides included.
-        seed: of what differs between the worlds.  first_world: number of the first of them.
-        attached: the controller and what it believes.
-        load: what the scenario's relative values are relative to.
-        world: what was simulated.
         start: qpos (W, nq) and qvel (W, nv) of the worlds at time 0, from which the applied wrenches replay the run.
-        time: (N+1,) [s].
-        reference: desired angle, rate and acceleration, each (N+1,) [rad, s].
-        desired: the same as orientations (N+1, 4), angular velocities and accelerations (N+1, 3), world axes.
+        desired: the reference as orientations (N+1, 4), angular velocities and accelerations (N+1, 3), world axes.
         log: the output of every stage.
-        wall_s: of the loop.
         plan: that was played in open loop, else None.
-        stances: the sets of contacts that are to hold, one after another.
-        stance: (W, N) the number of that which a world is in at each step; None, where there is one.
-        plans: of a receding horizon, what came of each; else None.  events: what a user has to know of.
-        engine_warnings: what MuJoCo warned of, as of a world that diverges: each once, with its first time.
-        python_objects: which of controller, control and observe were handed to `simulate`.
+        stance: (W, N) the number of the stance that a world is in at each step; None, where there is one.
     """
 
-    scenario: Scenario
-    seed: int
-    first_world: int
-    attached: Attached
-    load: Load
-    world: World
     start: tuple[Array, Array]
-    time: Array
-    reference: tuple[Array, Array, Array]
     desired: tuple[Array, Array, Array]
     log: Log
-    wall_s: float
     plan: Plan | None
-    stances: tuple[Stance, ...]
     stance: NDArray[np.int8] | None
-    plans: PlanLog | None
-    events: tuple[Event, ...]
-    engine_warnings: tuple[str, ...]
-    python_objects: tuple[str, ...]
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """From pickle, which forgets that arrays are read-only."""
-        vars(self).update(state)
-        _freeze(tuple(state.values()))
-
-    @property
-    def controller(self) -> str:
-        """ "scenario" for the scenario's own, "given" for another that was handed to `simulate`, "own control" for a
-        function of the user's own."""
-        if "control" in self.python_objects:
-            return "own control"
-        return "given" if "controller" in self.python_objects else "scenario"
-
-    @property
-    def certified(self) -> bool:
-        """Whether every answer carries a certificate and a prediction of the contact forces."""
-        return "control" not in self.python_objects
-
-    @property
-    def model(self) -> mujoco.MjModel:
-        """The world's, with the sensors of the loop."""
-        return self.world.model
-
-    @property
-    def truth(self) -> RigidBody:
-        """The object as the world has it."""
-        return self.world.truth
-
-    @property
-    def unit(self) -> float:
-        """Of the model's lengths [m], and with it of all lengths, forces and moments of a run."""
-        return self.world.unit
 
     @property
     def worlds(self) -> int:
@@ -121,9 +46,9 @@ class Trajectory:
         return self.log.states.shape[0]
 
     @property
-    def dt(self) -> float:
-        """Time step [s]."""
-        return float(self.time[1] - self.time[0])
+    def open_loop(self) -> bool:
+        """Whether a plan was played, whatever the object did."""
+        return self.plan is not None
 
     @property
     def position(self) -> Array:

@@ -53,6 +53,8 @@ def test_everything_public_is_documented(path: Path) -> None:
         assert ast.get_docstring(tree), path
     for node in ast.walk(tree):
         public = isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith("_")
+        if isinstance(node, ast.FunctionDef) and "overload" in map(ast.unparse, node.decorator_list):
+            continue  # its signature alone, of a function that is documented
         if public:
             inner = isinstance(node, ast.FunctionDef) and any(
                 node in ast.walk(other) and other is not node

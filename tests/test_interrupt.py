@@ -55,13 +55,13 @@ def test_while_kernels_are_compiled(tmp_path: Path, later: float) -> None:
     interrupted_when(lambda: True, process)
 
 
-@pytest.mark.parametrize("times", [1, 3])
-def test_in_the_loop(tmp_path: Path, times: int) -> None:
+@pytest.mark.parametrize(("times", "keep"), [(1, "all"), (3, "all"), (1, "measures")])
+def test_in_the_loop(tmp_path: Path, times: int, keep: str) -> None:
     """Also if it is asked for three times at once: what was temporary is tidied up all the same."""
     temporary, out = tmp_path / "temporary", tmp_path / "out"
     temporary.mkdir()
     words = ("run", "balance-2d", "--worlds", "64", "--set", "seconds=100", "--out", str(out))
-    process = started(*words, env={**os.environ, "TMPDIR": str(temporary)})
+    process = started(*words, "--keep", keep, env={**os.environ, "TMPDIR": str(temporary)})
     interrupted_when(lambda: bool(list(temporary.glob("pivoting-*"))), process, times)
     assert list(temporary.iterdir()) == []
     assert list(out.iterdir()) == []

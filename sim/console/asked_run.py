@@ -8,7 +8,7 @@ import click
 from pivoting.controller.validate import InputError
 from pivoting.sim.console.scenario_options import own_scenario, pairs
 from pivoting.sim.drawing.recording_id import digest
-from pivoting.sim.run import Run
+from pivoting.sim.experiment import Experiment
 from pivoting.sim.scenarios.scenario_file import ScenarioFile, read
 from pivoting.sim.scenarios.shipped_scenarios import OWN
 from pivoting.sim.scenarios.shipped_scenarios import scenario as find
@@ -23,13 +23,14 @@ def ask(
     settings: tuple[str, ...],
     limits: tuple[str, ...],
     open_loop: bool,
+    keep: str | None = None,
     **own: Any,
 ) -> ScenarioFile:
     """The run that is asked for, as if a file described it.
 
     Args:
         name: of the scenario.  file: that describes the run, in place of a name.
-        worlds, seed, open_loop: in place of those of the file, if they are given.
+        worlds, seed, open_loop, keep: in place of those of the file, if they are given.
         settings, limits: KEY=VALUE, changes of the scenario and of its limits.
         own: the options that describe an object of one's own.
 
@@ -47,13 +48,13 @@ def ask(
     if name != OWN and given:
         told = f"only the scenario {OWN} takes it, not {name or str(file)!r}"
         raise click.BadParameter(f"--{given[0].replace('_', '-')}: {told}")
-    others: dict[str, Any] = {"worlds": worlds, "seed": seed, "open_loop": open_loop or None}
+    others: dict[str, Any] = {"worlds": worlds, "seed": seed, "open_loop": open_loop or None, "keep": keep}
     others = {option: value for option, value in others.items() if value is not None}
     changed = bool(settings or limits or others)
     return replace(asked, case=case, **others, digest=None if changed else asked.digest)
 
 
-def changed_since(asked: ScenarioFile, run: Run) -> str:
+def changed_since(asked: ScenarioFile, run: Experiment) -> str:
     """What to say if the file describes a run that was another: its model, or what makes it, is not the same; or ""."""
     if asked.digest in (None, digest(run)):
         return ""

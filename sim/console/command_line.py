@@ -12,6 +12,7 @@ from pivoting import __version__
 from pivoting.errors import PivotingError
 from pivoting.sim.console.scenario_options import scenario_options
 from pivoting.sim.console.stdout import JsonOutput, console, json_option
+from pivoting.sim.keep import KEEP
 
 # What one command alone needs, as rerun and matplotlib, is imported by that.
 
@@ -100,6 +101,11 @@ class _RunCommand(click.Command):
 @click.option("--limit", "limits", multiple=True, metavar="KEY=VALUE", help="Change a limit of the verdict.")
 @scenario_options
 @click.option("--open-loop", is_flag=True, help="Plan the whole motion once and apply that, whatever happens.")
+@click.option(
+    "--keep",
+    type=click.Choice(list(KEEP)),
+    help="What is kept of each world; by default all, or as the file has it.",
+)
 @click.option("--out", type=click.Path(), help="Folder for what is kept: recording, arrays, scenario and summary.")
 @click.option("--record-world", type=click.IntRange(min=0), help="Which world is recorded; by default the worst.")
 @json_option("Print the summary as one JSON object and nothing else.")
@@ -113,6 +119,7 @@ def run(out: str | None, record_world: int | None, as_json: JsonOutput | None, *
     its natural time, sqrt(lever / gravity).
     """
     from pivoting.sim.console.asked_run import ask, changed_since
+    from pivoting.sim.run import Run
     from pivoting.sim.simulation import simulate
 
     asked = ask(**options)
@@ -128,6 +135,7 @@ def run(out: str | None, record_world: int | None, as_json: JsonOutput | None, *
             asked.seed,
             first_world=asked.first_world,
             open_loop=asked.open_loop,
+            keep=asked.keep,
             progress=report,
         )
     if told := changed_since(asked, finished):
@@ -137,7 +145,7 @@ def run(out: str | None, record_world: int | None, as_json: JsonOutput | None, *
     from pivoting.sim.console.run_tables import print_run
 
     also: dict[str, Any] = {}
-    if finished.verdict == "fail" and not asked.open_loop:
+    if finished.verdict == "fail" and not asked.open_loop and isinstance(finished, Run):
         from pivoting.sim.judging.advice import tried
 
         also["advice"] = tried(finished, simulate)
@@ -152,6 +160,8 @@ def run(out: str | None, record_world: int | None, as_json: JsonOutput | None, *
         print_run(console(), finished)
         if also:
             click.echo(_advised(also["advice"]))
+        elif may := finished.findings.remedies:
+            click.echo(f"what may hold it, not tried in so many worlds: {'; '.join(may[:3])}")
     for line in () if saved is None else saved.said:
         click.echo(line)  # under --json on stderr, as all else
     return 1 if finished.verdict == "fail" else 0

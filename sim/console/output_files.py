@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pivoting.sim.console.json_values import jsonable
 from pivoting.sim.drawing.rerun_recording import RecordingOffError, record, refuse_if_off
+from pivoting.sim.fleet import Fleet
 from pivoting.sim.run import Run
 from pivoting.sim.saved_run import SCENARIO, description, is_run, run_files
 from pivoting.sim.scenarios.scenario import Scenario
@@ -40,13 +41,13 @@ def stem(case: Scenario) -> str:
     return "-".join(re.sub(r"[^\w.,+#-]+", "_", part) for part in dict.fromkeys(parts) if part)
 
 
-def save(run: Run, folder: Path, world: int | None = None, *, also: Mapping[str, Any] | None = None) -> Saved:
+def save(run: Run | Fleet, folder: Path, world: int | None = None, *, also: Mapping[str, Any] | None = None) -> Saved:
     """Write NAME.rrd, NAME.nc, NAME.scenario.json and NAME.summary.json, which is also the folder's summary.json.
 
     All of them are written, whole, or none. NAME is that of `stem`, with a number behind it if another run has it.
 
     Args:
-        run: of `simulate`.
+        run: of `simulate`; of a fleet the world that is recorded is run again.
         folder: that exists.
         world: that is recorded; None: the worst.
         also: further entries of the summary.
@@ -61,7 +62,7 @@ def save(run: Run, folder: Path, world: int | None = None, *, also: Mapping[str,
     writers: dict[str, Writer] = {}
     try:
         refuse_if_off()
-        writers[f"{name}.rrd"] = partial(record, run, world=chosen)
+        writers[f"{name}.rrd"] = partial(_record, run, world=chosen)
         which = (
             f"world {chosen} of {run.worlds}" + (", the worst," if world is None else "") if run.worlds > 1 else "it"
         )
@@ -85,7 +86,11 @@ def save(run: Run, folder: Path, world: int | None = None, *, also: Mapping[str,
     return Saved(summary, [f"{wrote} {folder / f'{name}.summary.json'}, also as {LATEST}, {with_it}", told])
 
 
-def _free_name(run: Run, folder: Path) -> str:
+def _record(run: Run | Fleet, path: Path, *, world: int) -> Path:
+    return record(run, path, world=world) if isinstance(run, Run) else record(run.replay(world), path, world=0)
+
+
+def _free_name(run: Run | Fleet, folder: Path) -> str:
     """The run's own name in the folder, with a number behind it if another run's files have that name."""
     first, here = stem(run.scenario), written(description(run))
     for number in count(1):

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 from pivoting.models.length_unit import NAMES
+from pivoting.sim.experiment import Experiment
+from pivoting.sim.fleet import Fleet
 from pivoting.sim.run import Run
 from pivoting.sim.scenarios.key_declaration import declared_keys
 from rich.console import Console
@@ -38,7 +40,7 @@ _LINES = {
 }
 
 
-def print_run(console: Console, run: Run) -> None:
+def print_run(console: Console, run: Run | Fleet) -> None:
     """What was run, the table of its verdict, and what there is to say of it."""
     summary = run.summary()
     _print_scenario(console, run, summary)
@@ -48,7 +50,7 @@ def print_run(console: Console, run: Run) -> None:
     _print_notes(console, run, summary)
 
 
-def _print_scenario(console: Console, run: Run, summary: Mapping[str, Any]) -> None:
+def _print_scenario(console: Console, run: Experiment, summary: Mapping[str, Any]) -> None:
     """The scenario and what was read of the object."""
     console.print(f"[bold]{run.scenario.label}[/]: {run.scenario.summary}", soft_wrap=True, highlight=False)
     keys = declared_keys(type(run.scenario))
@@ -62,7 +64,7 @@ def _print_scenario(console: Console, run: Run, summary: Mapping[str, Any]) -> N
         console.print(line, highlight=False, markup=False, soft_wrap=True, style="dim")
 
 
-def _verdict_table(run: Run, summary: Mapping[str, Any]) -> Table:
+def _verdict_table(run: Experiment, summary: Mapping[str, Any]) -> Table:
     table = Table()
     for heading in ("measured in MuJoCo" + (", worst world" if run.worlds > 1 else ""), "value", "limit", ""):
         table.add_column(heading, justify="right" if heading in ("value", "limit") else "left")
@@ -81,7 +83,7 @@ def _verdict_table(run: Run, summary: Mapping[str, Any]) -> Table:
     return table
 
 
-def _print_verdict(console: Console, run: Run, summary: Mapping[str, Any]) -> None:
+def _print_verdict(console: Console, run: Experiment, summary: Mapping[str, Any]) -> None:
     failed = run.failed_worlds.size
     certificate = f"   greatest KKT residual: {summary['residual_max']:.1e}" if run.certified else ""
     console.print(
@@ -95,7 +97,7 @@ def _print_verdict(console: Console, run: Run, summary: Mapping[str, Any]) -> No
         console.print(line, highlight=False)
 
 
-def _print_times(console: Console, run: Run, summary: Mapping[str, Any]) -> None:
+def _print_times(console: Console, run: Run | Fleet, summary: Mapping[str, Any]) -> None:
     """How long the run took, its plans included."""
     console.print(
         f"{summary['sim_s']:g} s simulated in {summary['wall_s']:.2f} s; stating, solving and certifying the problem:"
@@ -110,7 +112,7 @@ def _print_times(console: Console, run: Run, summary: Mapping[str, Any]) -> None
             f" {summary['real_time_factor']:.1f} times real time",
             soft_wrap=True,
         )
-    if run.plan is not None:
+    if isinstance(run, Run) and run.plan is not None:
         console.print(
             f"open loop: a plan of {run.plan.horizon.steps} steps ({run.plan.passes} passes, {run.plan.seconds:.2f} s);"
             f" the object is at most {_short(summary['plan_angle_error_max_deg'])} deg off it",
@@ -118,10 +120,11 @@ def _print_times(console: Console, run: Run, summary: Mapping[str, Any]) -> None
         )
 
 
-def _print_notes(console: Console, run: Run, summary: Mapping[str, Any]) -> None:
+def _print_notes(console: Console, run: Experiment, summary: Mapping[str, Any]) -> None:
     """What a user has to know of: bounds that did not suffice, warnings, reasons, events."""
     if summary["bounded_steps"]:
-        told = f"{summary['bounded_steps']} of {run.status.size} steps: the bounds did not allow what was asked for"
+        steps = run.worlds * (len(run.time) - 1)
+        told = f"{summary['bounded_steps']} of {steps} steps: the bounds did not allow what was asked for"
         console.print(told, style="yellow", soft_wrap=True)
     for warning in run.engine_warnings:
         console.print(f"MuJoCo: {warning}", style="yellow", highlight=False, soft_wrap=True)
@@ -129,8 +132,10 @@ def _print_notes(console: Console, run: Run, summary: Mapping[str, Any]) -> None
         console.print(f"why: {reason}", style="yellow", soft_wrap=True, highlight=False)
     for event in run.events[:_EVENTS]:
         console.print(f"world {event.world}, {event.time:.3f} s: {event.what}", style="yellow", soft_wrap=True)
-    if len(run.events) > _EVENTS:
-        console.print(f"and {len(run.events) - _EVENTS} more events, all in summary.json", style="yellow")
+    left_out = summary.get("events_left_out", 0)
+    if more := max(len(run.events) - _EVENTS, 0) + left_out:
+        there = f"{len(run.events)} of all" if left_out else "all"
+        console.print(f"and {more} more events, {there} in summary.json", style="yellow")
 
 
 def _words(read: Mapping[str, Any], between: str = ", ") -> str:

@@ -7,10 +7,10 @@ import mujoco
 import numpy as np
 
 if TYPE_CHECKING:
-    from pivoting.sim.run import Run
+    from pivoting.sim.experiment import Experiment
 
 
-def digest(run: "Run") -> str:
+def digest(run: "Experiment") -> str:
     """Twelve hexadecimal digits; the same for equal runs on any day, whatever was measured in them."""
     model = np.zeros(mujoco.mj_sizeModel(run.model), np.uint8)
     mujoco.mj_saveModel(run.model, None, model)
@@ -28,7 +28,7 @@ def digest(run: "Run") -> str:
         case.stages,
     )
     out = hashlib.blake2b(digest_size=6)
-    _add(out, (*given, repr(words), run.controller, run.plan is not None))
+    _add(out, (*given, repr(words), run.controller, run.open_loop))
     return out.hexdigest()
 
 

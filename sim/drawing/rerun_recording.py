@@ -131,7 +131,7 @@ def record(run: Run, path: str | os.PathLike[str], *, world: int | None = None) 
 def _encoded(run: Run, world: int, rr: Any) -> bytes:
     """The file, made in memory: rerun's own file sink can hang on a full disk."""
     # fixed, without properties: files can be compared
-    name = f"{run.scenario.label} seed={run.seed} world={world} {digest(run)}"
+    name = f"{run.scenario.label} seed={run.seed} world={run.first_world + world} {digest(run)}"
     stream = rr.RecordingStream("pivoting", recording_id=name, send_properties=False)
     memory = stream.memory_recording()
     film = Film(run, world, rr, stream)

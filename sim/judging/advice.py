@@ -95,18 +95,23 @@ class _Case:
         return max(contact.mu for contact in self.run.attached.controller.contacts)
 
 
-def reasons(run: "Run") -> list[str]:
-    """Why a run failed, a sentence each, of its worst world; nothing if it passes."""
-    return list(_reasons(_Case(run))) if run.failed_worlds.size else []
+def reasons(run: "Run", strays: list[str] | None = None) -> list[str]:
+    """Why a run failed, a sentence each, of its worst world; nothing if it passes.
+
+    Args:
+        strays: its contacts that are not declared, in the words of the fleet that it is part of.
+    """
+    told = run.strays if strays is None else strays
+    return list(_reasons(_Case(run), told)) if run.failed_worlds.size else []
 
 
-def _reasons(case: _Case) -> Iterator[str]:
+def _reasons(case: _Case, strays: list[str]) -> Iterator[str]:
     run, i = case.run, case.world
     theta = np.rad2deg(run.theta[i])
     if case.diverged is not None:
         yield f"the object diverged at {case.diverged:.3g} s"
         return
-    yield from run.strays
+    yield from strays
     if case.let_go is not None and case.failed("contact_lost_s"):
         k = case.let_go
         lost = float(run.measures.contact_lost_s[i])

@@ -126,10 +126,15 @@ def _held(run: "ContactMotion") -> RowEffects:
     return held._replace(give=give, slides=slides)
 
 
-def slip_floor_unknown(run: "ContactMotion") -> str:
-    """Why that cannot be predicted, in the first world where it cannot; "" where it can in all."""
+def slip_floor_unknown(run: "ContactMotion", first: int = 0, of: int | None = None) -> str:
+    """Why that cannot be predicted, in the first world where it cannot; "" where it can in all.
+
+    Args:
+        first: index of the run's first world, where it is part of a fleet.  of: how many that has.
+    """
     found = why_unknown(run.world.contact_rows, _held(run), run.time, _settle(run))
-    told = [f"{why}{f' in world {world}' * (run.worlds > 1)}" for world, why in enumerate(found) if why]
+    several = (run.worlds if of is None else of) > 1
+    told = [f"{why}{f' in world {first + world}' * several}" for world, why in enumerate(found) if why]
     return told[0] if told else ""
 
 
@@ -139,5 +144,5 @@ def _settle(run: "ContactMotion") -> int:
 
 
 def _rms(values: Array) -> Array:
-    """Over steps, and over contacts where there are any."""
-    return np.sqrt(np.mean(values**2, axis=tuple(range(1, values.ndim))))
+    """Over steps, and over contacts where there are any; summed in one order, however many other worlds there are."""
+    return np.sqrt(np.mean(np.ascontiguousarray(values**2).reshape(len(values), -1), axis=1))

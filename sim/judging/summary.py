@@ -6,23 +6,21 @@ from typing import TYPE_CHECKING, Any
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.controller.solution import BOUNDED
 from pivoting.models.frames import matrix
 from pivoting.models.names import geom_name
 from pivoting.models.rigid_body import file_frame, laid_over
-from pivoting.sim.judging.advice import reasons, remedies
-from pivoting.sim.judging.measures import slip_floor_unknown
 from pivoting.sim.pipeline.plan_log import plan_figures
 
 if TYPE_CHECKING:
-    from pivoting.sim.run import Run
+    from pivoting.sim.experiment import Experiment
 
 Array = NDArray[np.float64]
 _CHOSEN = ("contacts", "coupling", "reason")  # of the contact settings, what the model itself does not say
 
 
-def summary(run: "Run") -> dict[str, Any]:
-    """The run in numbers, of the worst world, SI units in the keys; what `--json` prints."""
+def summary(run: "Experiment") -> dict[str, Any]:
+    """A run or a fleet in numbers, of the worst world, SI units in the keys; what `--json` prints."""
+    found = run.findings
     worst = {key: float(np.max(value)) for key, value in vars(run.measures).items()}
     return {
         "scenario": run.scenario.name,
@@ -41,16 +39,16 @@ def summary(run: "Run") -> dict[str, Any]:
         "failed_worlds": run.failed_worlds.tolist(),
         "worst_world": run.worst_world,
         **worst,
-        "slip_floor_unknown": slip_floor_unknown(run) or None,
+        "slip_floor_unknown": found.slip_floor_unknown or None,
         "solve_us_median": float(np.median(run.control_us)),
         "solve_us_p99": float(np.quantile(run.control_us, 0.99)),
         "sim_s": float(run.time[-1]),
         "wall_s": run.wall_s,
         "real_time_factor": run.worlds * float(run.time[-1]) / run.wall_s,
-        "bounded_steps": int(np.count_nonzero(run.status == BOUNDED)),
-        "reasons": reasons(run),
-        "remedies": [remedy.setting for remedy in remedies(run)],
-        "undeclared_contacts": run.strays,
+        "bounded_steps": found.bounded_steps,
+        "reasons": found.reasons,
+        "remedies": found.remedies,
+        "undeclared_contacts": found.strays,
         "support": geom_name(run.model, run.truth.support),
         "contact": "; ".join(",".join(f"{x:.9g}" for x in point) for point in _in_file(run)),
         "object": object_figures(run),
@@ -58,17 +56,16 @@ def summary(run: "Run") -> dict[str, Any]:
         "events": [event._asdict() for event in run.events],
         "engine_warnings": list(run.engine_warnings),
         **({} if run.plans is None else plan_figures(run.plans)),
-        **({} if run.plan is None else {"plan_angle_error_max_deg": float(np.rad2deg(run.plan_error.max()))}),
     }
 
 
-def _in_file(run: "Run") -> Array:
+def _in_file(run: "Experiment") -> Array:
     """(K, 3) the contacts as --contact takes them, in the frame and unit of length that the file gives the body."""
     origin, axes = file_frame(run.model, run.truth.index)
     return (run.truth.com + run.points @ matrix(run.truth.axes).T - origin) @ axes
 
 
-def object_figures(run: "Run") -> dict[str, Any]:
+def object_figures(run: "Experiment") -> dict[str, Any]:
     """What was read of the object, as the world has it, in the frame that its file gives the body."""
     origin, axes = file_frame(run.model, run.truth.index)
     return {
@@ -85,7 +82,7 @@ def object_figures(run: "Run") -> dict[str, Any]:
     }
 
 
-def contact_figures(run: "Run") -> dict[str, Any]:
+def contact_figures(run: "Experiment") -> dict[str, Any]:
     """The support's contact parameters in the world, and what they replaced of the file."""
     opt, geom = run.model.opt, run.truth.support
     return {

@@ -37,10 +37,13 @@ def refuse_strays(
 
 
 @engine_log()
-def stray_words(run: "Run") -> list[str]:
+def stray_words(run: "Run", first: int = 0) -> list[str]:
     """Which geoms met in contacts that are not declared, in the worst world, and when first; by replaying it.
 
     The applied wrenches lead to the same states bit for bit, so that MuJoCo's own list of contacts can be read.
+
+    Args:
+        first: index of the run's first world, where it is part of a fleet.
     """
     strays = run.log.contacts.strays > 0.0
     if not strays.any():
@@ -63,6 +66,6 @@ def stray_words(run: "Run") -> list[str]:
     return [
         f"geom {label(run.model, own)} touches {label(run.model, other)}"
         + (" away from the contact" if other == run.truth.support else "")
-        + f" at {time:.3g} s in world {world}"
+        + f" at {time:.3g} s in world {first + world}"
         for (own, other), time in found.items()
     ]

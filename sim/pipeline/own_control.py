@@ -19,13 +19,16 @@ class Moment(NamedTuple):
         time: [s].
         states: of W worlds, as measured and estimated.
         desired: where the object is to be now; the same for all worlds, (1, ...).
-        before: (W, nw) the wrenches that it gave at the step before, None at first.
+        before: (W, nw) the wrenches that it gave at the step before, None at first. With None a function that has a
+            state begins anew: a fleet's worlds are run in chunks, one after the other.
+        first_world: number of the first of the W worlds.
     """
 
     time: float
     states: States
     desired: Desired
     before: Array | None
+    first_world: int = 0
 
 
 OwnControlFunction = Callable[[Moment], ArrayLike]  # gives (W, nw) or (nw,) wrenches, object axes [N, N m]
@@ -37,12 +40,15 @@ class OwnControl:
     Args:
         desired: (N+1, 4), (N+1, 3), (N+1, 3), the reference at every step.
         dt: time step [s].
+        first_world: number of the first world.
     """
 
-    def __init__(self, function: OwnControlFunction, desired: tuple[Array, Array, Array], dt: float):
+    def __init__(
+        self, function: OwnControlFunction, desired: tuple[Array, Array, Array], dt: float, first_world: int = 0
+    ):
         if not callable(function):
             raise fail("control", function, "a function of a Moment that gives the wrench")
-        self._function, self._dt = function, dt
+        self._function, self._dt, self._first = function, dt, first_world
         self._desired = stacked(*desired)[:, None]
 
     def prepare(self, states: States, out: Answers) -> None:
@@ -50,7 +56,7 @@ class OwnControl:
         out.wrench[:] = 0.0
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
-        now = Moment(k * self._dt, states.copy(), Desired(self._desired[k]), before)
+        now = Moment(k * self._dt, states.copy(), Desired(self._desired[k]), before, self._first)
         given = np.asarray(self._function(now))
         W, nw = out.wrench.shape
         if given.dtype.kind not in "iuf" or given.shape not in ((W, nw), (nw,)):

@@ -2,7 +2,7 @@
 
     {"scenario": "pivot", "model": "mug.xml", "body": "mug", "contact": "vertex", "support": null, "as_modelled": false,
      "changes": {"theta_end": 30, "world.mu": 0.4, "limit.slip_m": 0.001},
-     "worlds": 8, "seed": 1, "first_world": 0, "open_loop": false}
+     "worlds": 8, "seed": 1, "first_world": 0, "open_loop": false, "keep": "all"}
 
 Only the first entry has to be there. A relative path counts from the file's folder. What is not a shipped scenario may
 also have "summary" and "about", and the name of a shipped "scene" in place of a "model".
@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pivoting.controller.validate import InputError
+from pivoting.controller.validate import InputError, one_of
+from pivoting.sim.keep import KEEP
 from pivoting.sim.scenarios.scenario import Scenario
 from pivoting.sim.scenarios.shipped_scenarios import own_object, scenario, shipped
 
@@ -42,6 +43,7 @@ _ENTRIES = {  # all entries, likewise
     "seed": (int,),
     "first_world": (int,),
     "open_loop": (bool,),
+    "keep": (str,),
     "python_objects": (list,),
     "digest": (str,),
     "versions": (dict,),
@@ -63,7 +65,7 @@ class ScenarioFile:
 
     Attributes:
         case: the scenario; None if a Python object is part of it, which no file can hold.
-        worlds, seed, first_world, open_loop: arguments of `simulate`.
+        worlds, seed, first_world, open_loop, keep: arguments of `simulate`.
         python_objects: what else the run was made with that no file can hold: scenario, controller, control, observe.
         digest: of the run, see `recording_id.digest`.  versions: by package, with which it was made.
         arrays: of a saved run, "file", "bytes" and "blake2b" of its arrays.
@@ -74,6 +76,7 @@ class ScenarioFile:
     seed: int = 0
     first_world: int = 0
     open_loop: bool = False
+    keep: str = "all"
     python_objects: tuple[str, ...] = ()
     digest: str | None = None
     versions: Mapping[str, str] = field(default_factory=dict)
@@ -96,6 +99,8 @@ def written(file: ScenarioFile) -> dict[str, Any]:
     said = _said(file.scenario)
     rest = {each.name: getattr(file, each.name) for each in fields(file) if each.name != "case"}
     rest["python_objects"] = list(file.python_objects)
+    if file.keep == "all":  # as ever
+        del rest["keep"]
     return {"format": FORMAT, **said, **{name: value for name, value in rest.items() if value is not None}}
 
 
@@ -144,6 +149,7 @@ def _check(said: Any) -> None:
         if type(value) not in _ENTRIES[name]:
             allowed = " or ".join(_KINDS[kind] for kind in _ENTRIES[name])
             raise InputError(f"{name} = {json.dumps(value)}: must be {allowed}")
+    one_of("keep", said.get("keep", "all"), tuple(KEEP))
 
 
 def _scenario(said: Mapping[str, Any], folder: Path) -> Scenario:

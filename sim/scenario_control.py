@@ -1,0 +1,85 @@
+"""The control of a scenario: its law on its reference, a horizon, bounds, stances; and the stages around it."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from pivoting.controller.validate import fail
+from pivoting.models.errors import ModelError
+from pivoting.sim.joint_drag import drag_wrench
+from pivoting.sim.pipeline.bounded_control import BoundedControl
+from pivoting.sim.pipeline.law_control import LawControl, LawSolver
+from pivoting.sim.pipeline.own_control import OwnControl, OwnControlFunction
+from pivoting.sim.pipeline.stages import Control, Observe, Stages, build_stages
+from pivoting.sim.pipeline.stance_control import StanceControl
+from pivoting.sim.run_setup import Begun
+from pivoting.sim.scenario_horizon import plan_playback, receding_horizon_control
+from pivoting.sim.stances import Stance
+
+
+class Decided(NamedTuple):
+    """What decides: the control, with the law that the first stance ends in, and the stages around it."""
+
+    control: Control
+    per_step: LawControl
+    stages: Stages
+
+
+def stages_of(begun: Begun, observe: Observe | None = None) -> Stages:
+    """The stages around the control that the scenario asks for, and an observer of the user's own."""
+    stages = build_stages(begun.case.stages, begun.setting)
+    return stages if observe is None else stages._replace(observe=(*stages.observe, observe))
+
+
+def laws_of(begun: Begun, stages: Stages) -> list[LawSolver]:
+    """The scenario's law, within its bounds, in each of its stances."""
+    return [LawSolver(stance.controllers, begun.bounds, stages.correct) for stance in begun.belief.stances]
+
+
+def decide(
+    begun: Begun,
+    stages: Stages,
+    solvers: Sequence[LawSolver],
+    own: OwnControlFunction | None = None,
+    open_loop: bool = False,
+) -> Decided:
+    """The scenario's control, which ends in these laws, or the user's own."""
+    case, stances, dt = begun.case, begun.belief.stances, begun.world.dt
+    laws = [_law_control(begun, *each) for each in zip(solvers, stances, strict=True)]
+    planned = open_loop or case.plan_hz is not None
+    if len(stances) > 1 and (planned or stages.correct):
+        raise fail("landing", "held", "ignored with a plan or integral action, which know one stance")
+    if own is not None:
+        return Decided(OwnControl(own, begun.told, dt, begun.setting.first_world), laws[0], stages)
+    if len(stances) == 1:
+        control = _planned(begun, solvers[0], open_loop) if planned else laws[0]
+        bounded = control if open_loop else _bounded(begun, control, stances[0])  # a plan is within them
+        return Decided(bounded, laws[0], stages)
+    controls = [_bounded(begun, law, stance) for law, stance in zip(laws, stances, strict=True)]
+    return Decided(StanceControl(stances, controls, dt, begun.setting.worlds, begun.steps), laws[0], stages)
+
+
+def _law_control(begun: Begun, solver: LawSolver, stance: Stance) -> LawControl:
+    """The law of a stance on the scenario's own reference."""
+    body = begun.belief.attached.body
+    drag = np.stack([drag_wrench(body, controller, *begun.told) for controller in stance.controllers], axis=1)
+    return LawControl(solver, begun.told, drag)
+
+
+def _bounded(begun: Begun, control: Control, stance: Stance) -> Control:
+    """A control within the scenario's bounds, where it has any."""
+    return BoundedControl(control, stance.controllers, begun.bounds, begun.world.dt) if begun.bounds.any else control
+
+
+def _planned(begun: Begun, law: LawSolver, open_loop: bool) -> Control:
+    """The control that makes plans, or plays one."""
+    belief, dt = begun.belief, begun.world.dt
+    if belief.attached.body.drag is not None:
+        name = belief.attached.body.name
+        raise ModelError(f"body = {name!r}: a plan knows no joint damping or friction; must have none")
+    if not open_loop:
+        worlds = begun.setting.worlds
+        return receding_horizon_control(begun.case, belief, law, begun.follow, worlds, dt, begun.steps)
+    if len(belief.controllers) > 1:
+        raise fail("controller", f"{len(belief.controllers)} of them", "one in open loop, where one plan is played")
+    return plan_playback(begun.case, belief, begun.follow, dt, begun.steps)
