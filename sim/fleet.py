@@ -128,13 +128,8 @@ class Fleet(Experiment):
             raise fail("world", world, f"a whole number in [0, {self.worlds})")
         if lost := [name for name in self.python_objects if name not in self.handed.names]:
             raise InputError(f"fleet: its {' and '.join(lost)} were Python objects, which no file holds")
-        run = simulate(
-            self.scenario,
-            1,
-            self.seed,
-            first_world=self.first_world + int(world),
-            **self.handed.of(int(world))._asdict(),
-        )
+        first, handed = self.first_world + int(world), self.handed.of(int(world))
+        run = simulate(self.scenario, 1, self.seed, first_world=first, **handed._asdict())
         for name, values in vars(self.measures).items():
             now, then = getattr(run.measures, name)[0], values[world]
             if not np.array_equal(now, then, equal_nan=True):
