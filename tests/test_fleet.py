@@ -262,17 +262,16 @@ def test_on_the_command_line(tmp_path: Path) -> None:
 MEMORY = """
 import resource, sys
 from pivoting import simulate
-simulate("pivot-2d", 200, seconds=0.5, keep="measures")
-before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-simulate("pivot-2d", int(sys.argv[1]), seconds=0.5, keep="measures")
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+for worlds in (400, 1200):
+    simulate("pivot-2d", worlds, seconds=0.5, keep="measures")
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="has no getrusage")
 def test_memory_does_not_grow_with_the_worlds() -> None:
-    """800 worlds of 1750 steps would take 700 MB where all is kept; a chunk takes as much as it did before."""
-    call = [sys.executable, "-c", MEMORY, "800"]
-    done = subprocess.run(call, capture_output=True, text=True, timeout=300, check=True)
-    grown = int(done.stdout) / (1024 if sys.platform == "linux" else 1024**2)
-    assert grown < 60, f"{grown:.0f} MB"
+    """800 worlds more, of 1750 steps, would take 1400 MB where all is kept; the allocator needs a few chunks' room."""
+    done = subprocess.run([sys.executable, "-c", MEMORY], capture_output=True, text=True, timeout=300, check=True)
+    few, many = (int(line) / (1024 if sys.platform == "linux" else 1024**2) for line in done.stdout.split())
+    grown = many - few
+    assert grown < 250, f"{grown:.0f} MB"
