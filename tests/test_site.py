@@ -78,11 +78,12 @@ def test_the_front_page_of_the_reference_has_every_name() -> None:
     assert re.findall(r"\[`(\w+)`\]", (ROOT / "docs/api/pivoting.md").read_text()) == exported
 
 
-def test_the_page_of_results_is_made_of_the_committed_results() -> None:
-    call = [sys.executable, ROOT / "benchmarks/results_page.py"]
+@pytest.mark.parametrize("name", ["results", "engines"])
+def test_pages_of_measured_figures_are_made_of_the_committed_results(name: str) -> None:
+    call = [sys.executable, ROOT / "benchmarks/results_page.py", name]
     page = subprocess.run(call, capture_output=True, text=True, check=True).stdout
-    assert page == (ROOT / "docs/results.md").read_text(), "make figures"
-    template = (ROOT / "docs/results.template.md").read_text()
+    assert page == (ROOT / f"docs/{name}.md").read_text(), "make figures"
+    template = (ROOT / f"docs/{name}.template.md").read_text().partition("\n## Measured once, by hand\n")[0]
     prose = re.sub(r"\{\{.*?\}\}|`[^`]*`|\]\(.*?\)", "", template, flags=re.DOTALL)
     measured = re.findall(r"\d+\.\d+|\de-\d+", prose)
     assert set(measured) <= {"0.05", "1.5", "1e-5", "1e-10"}, "a figure that is not taken from a result"
