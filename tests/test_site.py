@@ -59,6 +59,20 @@ def test_links_and_pictures_lead_somewhere() -> None:
             assert anchor in [re.sub(r"[^\w -]", "", head).lower().replace(" ", "-") for head in heads], target
 
 
+def test_every_picture_is_made_by_make_figures_or_listed_as_a_screenshot() -> None:
+    shown = {
+        (page.parent / target).resolve().relative_to(ROOT).as_posix()
+        for page, target in links()
+        if Path(target).suffix in (".png", ".gif")
+    }
+    recipe = re.search(r"^figures:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert recipe is not None
+    made = set(re.findall(r"docs/[\w-]+\.(?:png|gif)", recipe[1]))
+    screenshots = set(re.findall(r"^\| `(docs/[\w-]+\.png)`", (ROOT / "CONTRIBUTING.md").read_text(), re.MULTILINE))
+    assert not made & screenshots
+    assert shown == made | screenshots
+
+
 @pytest.mark.parametrize("room", ["controller", "models", "sim"])
 def test_the_reference_has_every_name_that_is_exported(room: str) -> None:
     page = (ROOT / f"docs/api/{room}.md").read_text()
