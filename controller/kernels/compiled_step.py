@@ -1,4 +1,4 @@
-"""The compiled step: of every world the problem is stated, solved within bounds and certified; the wrench is turned."""
+"""The compiled step of the loop: it makes, solves and certifies the wrench problem of every world."""
 
 from typing import NamedTuple
 
@@ -26,13 +26,13 @@ STATE = 13  # numbers of a state: position (3), quaternion (4), velocity (3), an
 
 
 class Belief(NamedTuple):
-    """What the compiled step needs to know, as arrays.
+    """What the controller believes about the object and its contacts, as the arrays that the compiled step needs.
 
     Attributes:
         points, offsets, frames: (K, 3), (K, 3), (K, 3, 3) of the contacts, see `fill_jacobian`.
-        pivot: (3,) from the CoM to the point that stays put (the contacts' mean), or rolls, object axes [m].
-        offset: (3,) from there to where it touches (the contacts' mean), world axes [m].
-        mu: (K,) that may be used.  f_min: (K,) [N].
+        pivot: (3,) from the CoM to the mean of the contacts, which stays where it is or rolls, object axes [m].
+        offset: (3,) from there to the mean of the points of contact, world axes [m].
+        mu: (K,) friction that may be used.  f_min: (K,) least normal forces [N].
         mass: [kg].  inertia: (3, 3) object axes [kg m^2].  gravity: (3,) world axes [m/s^2].
         law: (feedforward, kp, kd, velocity_terms), see `Law`.
         Q_w, Q_f: weights, see `WrenchProblem`.
@@ -58,7 +58,7 @@ class Belief(NamedTuple):
 
 @kernel
 def state_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ignore[no-untyped-def]
-    """Write R (3, 3), J (nw, K d) and the required wrench b (nw,) at one state."""
+    """Write the problem at one state: R (3, 3), J (nw, K d) and the required wrench b (nw,)."""
     fill_rotation(q, R)
     fill_jacobian(R, belief.points, belief.offsets, belief.frames, belief.wrench_map, belief.force_map, J)
     fill_required(R, q, omega, q_d, omega_d, alpha_d, belief, b)
@@ -68,22 +68,23 @@ def state_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ig
 def step_worlds(  # type: ignore[no-untyped-def]
     belief, bounds, own, planar, several, tolerance, states, desired, external, out, status
 ):  # fmt: skip
-    """State, solve and certify the problem of every world.
+    """Make, solve and certify the wrench problem of every world.
 
     Args:
         belief: the values of `Belief`, shared by the worlds.
-        bounds: the values of `WrenchBounds.stacked`, or None. One that is not on a rate is kept, as a heavier weight;
-            where that needs more than `HEAVIEST` times the weight, or a second bound, the answer is that without any.
+        bounds: the values of `WrenchBounds.stacked`, or None. One bound that is not on a rate is kept, by a heavier
+            weight. If that needs more than `HEAVIEST` times the weight, or if a second bound is exceeded, the answer is
+            the one without bounds.
         own, planar, several: `WrenchController.workspace()`.
         tolerance: largest relative KKT residual of status 0 (solved).
-        states: (W, 13 or more) as measured; of each its orientation and its angular velocity count, see `STATE`.
-        desired: (W, 10) orientation (4), angular velocity (3) and acceleration (3) of the reference now; (1, 10) is
-            the same for all worlds.
-        external: (W, nw) or (1, nw), known wrenches on the object besides gravity, contacts and the controller's own,
-            object axes.
-        out: (W, 2 nw + K d + 1), written: required (nw), the right-hand side J f + w of the problem, `external` taken
-            off, object axes; wrench (nw), object axes, nan where the status is 2 (failed: no finite answer); force
-            (K d), contact axes; residual.
+        states: (W, 13 or more) measured states, see `STATE`, of which orientation and angular velocity are used.
+        desired: (W, 10) orientation (4), angular velocity (3) and acceleration (3) of the reference now; (1, 10) if
+            it is the same for all worlds.
+        external: (W, nw) or (1, nw), known wrenches on the object other than those of gravity, the contacts and the
+            controller, object axes.
+        out: (W, 2 nw + K d + 1), written: required (nw), the right-hand side J f + w of the problem, less
+            `external`, object axes; wrench (nw), object axes, nan where the status is 2 (failed: no finite answer);
+            force (K d), contact axes; residual.
         status: (W,) int8, written: 0 solved, 1 inaccurate, 2 failed.
     """
     belief = Belief(*belief)
@@ -134,11 +135,11 @@ def step_worlds(  # type: ignore[no-untyped-def]
 
 @kernel
 def world_wrench(wrench_map, q, wrench, out):  # type: ignore[no-untyped-def]
-    """Turn a wrench in object axes into (force, torque) at the CoM in WORLD axes, as `xfrc_applied` wants them.
+    """Turn a wrench in object axes into force and torque at the CoM in WORLD axes, as `xfrc_applied` expects them.
 
     Args:
         wrench_map: (nw, 6), see `Space`.  q: (4,) object to world.  wrench: (nw,).
-        out: (6,), written; zero where the wrench is not finite: without an answer nothing is applied.
+        out: (6,), written; zero if the wrench is not finite, because nothing is applied without an answer.
     """
     for half in (0, 3):
         a = b = c = 0.0
@@ -153,7 +154,7 @@ def world_wrench(wrench_map, q, wrench, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def apply_wrenches(wrench_map, states, wrenches, first, out, xfrc, body):  # type: ignore[no-untyped-def]
-    """Write the wrenches of W worlds, turned as by `world_wrench`, to the log and to MuJoCo.
+    """Write the wrenches of W worlds, turned into world axes as by `world_wrench`, to the log and to MuJoCo.
 
     Args:
         states: (W, 13 or more), see `STATE`.
