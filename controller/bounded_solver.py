@@ -1,9 +1,10 @@
-"""The wrench problem with bounds: what is applied where the smallest wrench is more than an actuator can give.
+"""The wrench problem with bounds on the wrench, for steps in which the smallest wrench would exceed them.
 
     min  1/2 w'Q_w w + 1/2 f'Q_f f + rho_a |a| + rho_s |s|   s.t.  J f + w = required + B a + s,  cones,  bounds on w
 
-a is an angular acceleration about the contacts that is given up, s what else has to be; the penalties are exact, so
-that both are zero where the bounds allow it, and s is where giving up a is enough. Always feasible.
+Here a is the angular acceleration about the contacts that has to be given up, and s whatever else has to be given up.
+The penalties are exact: a and s are zero where the bounds allow the required motion, and s is zero where giving up a is
+enough. The problem is always feasible.
 """
 
 from dataclasses import dataclass
@@ -27,13 +28,13 @@ EXACT = 1e-6  # of the weight: less than this is nothing given up
 
 @dataclass(frozen=True, eq=False)
 class BoundedWrench:
-    """An answer within bounds.
+    """The answer to a wrench problem with bounds.
 
     Attributes:
         wrench: (nw,) object axes [N, N m].  force: (K, d) contact axes [N].
-        lacking: (nw,) required minus what contact and wrench make together, object axes [N, N m].
-        residual: relative KKT residual of the program above.
-        exact: nothing is lacking.
+        lacking: (nw,) the required wrench minus that of the contacts and the applied one, object axes [N, N m].
+        residual: relative KKT residual of the problem in the head of this file.
+        exact: whether nothing is lacking.
     """
 
     wrench: Array
@@ -44,11 +45,11 @@ class BoundedWrench:
 
 
 class BoundedSolver:
-    """Solves wrench problems of one controller within bounds; Clarabel is set up once.
+    """Solves the wrench problems of one controller within bounds, with Clarabel, which is set up once.
 
     Args:
-        controller: whose problems they are.
-        bounds: on the wrench.
+        controller: the one whose problems are solved.
+        bounds: on the applied wrench.
         dt: time between two wrenches, for bounds on the rate [s].
     """
 
@@ -103,12 +104,12 @@ class BoundedSolver:
         self._solve = ClarabelWithRetry(step=0.999)  # 14 iterations in place of 20
 
     def __call__(self, orientation: Array, required: Array, before: Array | None = None) -> BoundedWrench:
-        """The answer to a problem of the controller.
+        """Solve a problem of the controller within the bounds.
 
         Args:
-            orientation: (4,) object axes to world, at which it was stated.
+            orientation: (4,) of the object in that problem, object axes to world.
             required: (nw,) see `WrenchProblem`.
-            before: (nw,) wrench applied until now, for bounds on the rate; None: not known.
+            before: (nw,) the wrench applied until now, for bounds on the rate; None if it is not known.
         """
         nw, n = len(self._scale), len(self._belief.contacts.Q_f)
         jacobian = self._controller.jacobian(orientation)
@@ -133,7 +134,7 @@ class BoundedSolver:
 
 @kernel
 def _fill_turning(axes, q, belief, scale, R, out):  # type: ignore[no-untyped-def]
-    """Write -B (nw, A), the wrenches that accelerate the object about its free axes, with entries up to 1, in `scale`.
+    """Write -B (nw, A), the wrenches that accelerate the object about its free axes, in `scale`, with entries up to 1.
 
     Args:
         axes: (A, 3) object axes.  q: (4,) object axes to world.  R: (3, 3) scratch.

@@ -1,4 +1,4 @@
-"""Friction cones and bounds on the wrench as rows of a conic program: half-lines side - linear x >= 0, and cones."""
+"""Friction cones and bounds on the wrench, written as the constraint rows of a conic program."""
 
 from typing import NamedTuple
 
@@ -13,10 +13,11 @@ UNBOUNDED = 1e3  # of the weight: in place of a bound on the change from a wrenc
 
 
 class ConeConstraints(NamedTuple):
-    """side - rows x in half-lines (`linear`) and in second-order cones of `orders` (`cone`).
+    """Linear and second-order cone constraints on a wrench or on contact forces x.
 
-    x is a wrench or a set of contact forces; where `rate`, it is what that differs by from the one before. `rated`:
-    whether there is such a row.
+    They are linear_side - linear x >= 0, and cone_side - cone x in second-order cones of the sizes `orders`. In rows
+    that are marked in `linear_rate` or `cone_rate`, x is the change since the previous step; `rated` says whether there
+    are such rows.
     """
 
     linear: Array
@@ -29,11 +30,12 @@ class ConeConstraints(NamedTuple):
     rated: bool
 
     def place(self, sides: Array, first: tuple[int, int], before: Array | None) -> None:
-        """Write the right-hand sides of the first step among a program's, where its rates count from `before`.
+        """Write the right-hand sides of a program's first step, whose changes are counted from the wrench `before`.
 
         Args:
-            sides: of the program.  first: where its rows in half-lines and those in cones begin.
-            before: (nw,) the wrench before it; None: unknown.
+            sides: the right-hand sides of the program.
+            first: where the linear rows and the cone rows of its first step begin.
+            before: (nw,) the wrench before the first step; None if it is not known.
         """
         if not self.rated:
             return
@@ -48,10 +50,11 @@ class ConeConstraints(NamedTuple):
 
 
 def friction_limits(mu: Array, floors: Array, dim: int, edges: int = 0) -> ConeConstraints:
-    """The truncated friction cones of K contacts on forces (K d,): |f_t| <= mu f_n, f_n >= floor.
+    """The truncated friction cones |f_t| <= mu f_n, f_n >= floor of K contacts, as constraints on forces (K d,).
 
-    Half-lines hold each contact's floor and then the linear sides of its cone: both of them in the plane, in space the
-    faces of the inscribed pyramid of so many `edges`; without edges, the cones of space are second-order cones.
+    For each contact the linear rows contain its floor and then the flat sides of its cone. In the plane a cone has two
+    sides. In space they are the faces of the inscribed pyramid with this number of `edges`; with 0 edges the round cone
+    itself is a second-order cone.
     """
     K, second_order = len(mu), dim == 3 and not edges
     faces = np.zeros((0, 2))
@@ -77,9 +80,9 @@ def friction_limits(mu: Array, floors: Array, dim: int, edges: int = 0) -> ConeC
 
 
 def wrench_limits(bounds: WrenchBounds, nw: int, edges: int, unit: Array, h: float) -> ConeConstraints:
-    """Bounds on wrenches (nw,) in units (nw,), and on their change over a step of `h` [s].
+    """Bounds as constraints on a wrench (nw,), expressed in units (nw,), and on its change over a step of `h` [s].
 
-    With `edges`, two components are kept in the inscribed polygon of so many edges; with 0 in their disc.
+    A bound on the length of two components is a disc. With `edges` > 0 the inscribed polygon replaces it.
     """
     linear: list[Array] = []
     cone: list[Array] = []

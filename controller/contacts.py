@@ -1,4 +1,4 @@
-"""Contacts and the contact Jacobian."""
+"""Contacts of an object with its support, and the contact Jacobian, which turns their forces into a wrench."""
 
 from dataclasses import dataclass
 
@@ -12,12 +12,13 @@ from pivoting.controller.validate import Array, array, fail, number, one_of
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """A point or a ball of the object that sticks to its support, with the friction it may use.
+    """A contact that is to stick: a point or a ball of the object, and the friction at it.
 
-    A ball, such as the end of a capsule, sticks by rolling: it turns about where it touches, which moves on with it.
+    A ball, such as the end of a capsule, sticks by rolling without slipping.
 
     Attributes:
-        point: (d,) from the centre of mass to the contact or the ball's centre, object axes [m]; d = 2 (x, z) or 3.
+        point: (d,) the contact, or the centre of the ball, relative to the centre of mass, object axes [m]; d is 2 in
+            the plane, with (x, z), and 3 in space.
         mu: friction coefficient, > 0.
         f_min: floor of the normal force [N], >= 0 (a truncated cone).
         frame: (d, d) contact axes as columns, tangent(s) first and the normal (into the object) last, in the axes of
@@ -72,8 +73,8 @@ class Contact:
 def fill_jacobian(R, held, wrench_map, J):  # type: ignore[no-untyped-def]
     """Write the contact Jacobian into J (nw, K d): contact forces, in contact axes, to the wrench in object axes.
 
-    J_c = [I; r^] R(theta) with r^ f = r x f, which in the plane is r^ = [-r_y, r_x] (erratum 3 of the notes), and r
-    from the CoM to where the contact touches.
+    J_c = [I; r^] R(theta) with r^ f = r x f, where r leads from the CoM to the point of contact. In the plane
+    r^ = [-r_y, r_x] (erratum 3 of the notes).
 
     Args:
         R: (3, 3) object to world.

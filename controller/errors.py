@@ -1,4 +1,4 @@
-"""What is raised when there is no answer: `SolveError` of a wrench problem, `PlanError` of a horizon."""
+"""The exceptions for problems without an answer: `SolveError` of a wrench problem, `PlanError` of a plan."""
 
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,10 @@ if TYPE_CHECKING:  # they carry what was refused, but do nothing with it
 
 
 class SolveError(PivotingError, RuntimeError):
-    """No answer within tolerance. Carries the `problem` and the refused `solution` (with its status and residual)."""
+    """A wrench problem has no answer within tolerance.
+
+    The error carries the `problem` and the rejected `solution`, with its status and residual.
+    """
 
     def __init__(self, solution: "Solution", tolerance: float, message: str):
         self.problem = solution.problem
@@ -22,7 +25,7 @@ class SolveError(PivotingError, RuntimeError):
 
 
 class PlanError(PivotingError, RuntimeError):
-    """No plan. Carries the `plan` that was refused, with its status and residual."""
+    """There is no plan. The error carries the rejected `plan`, with its status and residual."""
 
     def __init__(self, plan: "Plan"):
         self.plan = plan

@@ -1,4 +1,4 @@
-"""The regular polygon inscribed in the unit circle: what a friction cone becomes for a QP solver."""
+"""The regular polygon inscribed in the unit circle: the cross-section of the pyramid that replaces a round cone."""
 
 from typing import NamedTuple
 
@@ -7,17 +7,22 @@ from pivoting.controller.validate import Array, fail
 
 
 class Polygon(NamedTuple):
-    """vertices: (m, 2), on the unit circle.  facets: (m, 2) rows with facet . p <= 1 inside."""
+    """A polygon inscribed in the unit circle.
+
+    Attributes:
+        vertices: (m, 2) on the unit circle.
+        facets: (m, 2) rows, one for each side; a point p is inside if facet . p <= 1 for all of them.
+    """
 
     vertices: Array
     facets: Array
 
 
 def polygon(edges: int) -> Polygon:
-    """The polygon of `edges` >= 3 edges, its first vertex along the first tangent.
+    """The polygon with this number of edges (at least 3), whose first vertex is in the direction of the first tangent.
 
     Raises:
-        ValueError: fewer than 3 edges, or not a whole number.
+        ValueError: `edges` is less than 3 or not a whole number.
     """
     check_edges(edges)
     angle = 2.0 * np.pi / edges * np.arange(edges)
@@ -27,10 +32,10 @@ def polygon(edges: int) -> Polygon:
 
 
 def check_edges(edges: object) -> int:
-    """`edges`, if a polygon may have so many.
+    """Return `edges` if a polygon can have this number of edges.
 
     Raises:
-        ValueError: fewer than 3, or not a whole number.
+        ValueError: `edges` is less than 3 or not a whole number.
     """
     if not isinstance(edges, int | np.integer) or isinstance(edges, bool) or edges < 3:
         raise fail("edges", edges, "a whole number >= 3")

@@ -1,10 +1,11 @@
 """The certificate: how far an answer is from satisfying the optimality (KKT) conditions of its own problem.
 
 For  min 1/2 w'Q_w w + 1/2 f'Q_f f  s.t.  J f + w = b,  f_i in K_i = {|f_t| <= mu f_n, f_n >= f_min}
-the multiplier of the equality is y = -Q_w w, and z = Q_f f - J'Q_w w is the gradient along f. The answer is optimal
-iff it is feasible and z'f is the least value of z' over the cones: z_n >= mu |z_t| (z in the dual cone) and
-z'f = sum f_min (z_n - mu |z_t|). All four conditions are closed form, in the plane and in space, for any K. For an
-inscribed pyramid they are the same with |f_t| replaced by the gauge of its polygon and |z_t| by the support of -z_t.
+the multiplier of the equality is y = -Q_w w, and z = Q_f f - J'Q_w w is the gradient along f. The answer is optimal if
+and only if it is feasible and no point of the cones has a smaller product with z than f has. That is the case if
+z_n >= mu |z_t| (z is in the dual cone) and z'f = sum f_min (z_n - mu |z_t|). All four conditions are formulas, in the
+plane and in space, for any number K of contacts. For an inscribed pyramid they are the same, with the gauge of its
+polygon in place of |f_t| and the support function of the polygon at -z_t in place of |z_t|.
 """
 
 import numpy as np
@@ -13,18 +14,18 @@ from pivoting.controller.kernels.compilation import kernel, subroutine
 
 @kernel
 def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, pull, vertices=None, facets=None):  # type: ignore[no-untyped-def]
-    """The largest of four relative residuals: equilibrium, friction cones, dual cones, duality gap.
+    """The relative KKT residual: the largest of those of equilibrium, friction cones, dual cones and duality gap.
 
-    Each is a backward error: relative to the sum of the absolute values of the terms that it is made of (Oettli and
-    Prager 1964): |J||f| + |w| + |b| for the equilibrium, |Q_f||f| + |J'||Q_w||w| for the gradient, both sides of the
-    duality gap. Rounding w and f to doubles alone perturbs Q_w w by eps |Q_w||w|, which no solver can avoid. A force
-    outside its cone is seen against the forces of the equilibrium, so that 1e-17 N at the apex is no violation.
-    0 is optimal to the last bit; nan if the answer is not finite.
+    Each of the four is a backward error, relative to the sum of the absolute values of its terms (Oettli and Prager
+    1964): |J||f| + |w| + |b| for the equilibrium, |Q_f||f| + |J'||Q_w||w| for the gradient, and both sides for the
+    duality gap. Merely rounding w and f to doubles perturbs Q_w w by eps |Q_w||w|, which no solver can avoid. The
+    distance of a force from its cone is relative to the forces of the equilibrium, so that 1e-17 N at the apex is no
+    violation. A residual of 0 means optimal to the last bit. The residual is nan if the answer is not finite.
 
     Args:
         J: (nw, K d); b, w: (nw,); f: (K d,); Q_w: (nw, nw); Q_f: (K d, K d); mu (planned), f_min: (K,).
         pull: (2, nw) scratch, for Q_w w and |Q_w||w|.
-        vertices, facets: (m, 2) of the polygon that stands for the unit disc, see `polygon`; None for the disc.
+        vertices, facets: (m, 2) of the polygon that replaces the unit disc, see `polygon`; None for the disc itself.
     """
     nw, n = J.shape
     K = mu.shape[0]

@@ -1,4 +1,4 @@
-"""A set of contacts that all stay put: what an object can still do."""
+"""How an object can still move when all of its contacts stay where they are."""
 
 import numpy as np
 from pivoting.controller.validate import Array
@@ -7,7 +7,7 @@ _COLINEAR = 1e-9  # of the farthest of them from their mean
 
 
 def free_axes(points: Array, pivot: Array, wrench_map: Array) -> Array:
-    """(A, 3) unit vectors, object axes, about which an object can still turn: A = 3, 1 or 0, in the plane 1 or 0.
+    """The axes about which the object can still turn: (A, 3) unit vectors, object axes; A is 3, 1 or 0.
 
     Args:
         points: (K, 3) contacts from the CoM, object axes [m].  pivot: (3,) their mean.
@@ -23,10 +23,10 @@ def free_axes(points: Array, pivot: Array, wrench_map: Array) -> Array:
 
 
 def fixed_pairs(points: Array, pivot: Array, wrench_map: Array) -> Array:
-    """(D, 2, 3) pairs (u, e) of object axes: e, where it pointed at the start, does not turn towards u.
+    """The turns that the contacts prevent, as (D, 2, 3) pairs (u, e) of object axes: e must not turn towards u.
 
-    Contacts stay put if their mean does and, where they are on a line, that line does not turn; off a line, nothing
-    turns. Rows for every point would say the same several times over.
+    Contacts stay where they are if their mean does and if the line on which they lie does not turn; if they are not on
+    one line, the object must not turn at all. A condition for every point would be redundant.
     """
     (along, across, normal), rank = _spread(points, pivot)
     pairs = [[], [(across, along), (normal, along)], [(across, along), (normal, along), (normal, across)]][rank]

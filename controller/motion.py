@@ -1,4 +1,4 @@
-"""An orientation and how it changes, as it is measured and as it is asked for."""
+"""The rotational state of an object: orientation, angular velocity and angular acceleration."""
 
 from typing import NamedTuple
 
@@ -6,10 +6,11 @@ from numpy.typing import ArrayLike
 
 
 class Motion(NamedTuple):
-    """An orientation and how it changes: a measured state or a point of a reference.
+    """An orientation with its angular velocity and acceleration: a measured state, or a reference at one time.
 
-    Plane: angle theta [rad], its rate [rad/s] and acceleration [rad/s^2], as floats.
-    Space: unit quaternion (w, x, y, z) object to world, angular velocity and acceleration (3,) in world axes.
+    In the plane these are the angle theta [rad], its rate [rad/s] and its acceleration [rad/s^2], as floats. In space
+    they are a unit quaternion (w, x, y, z) from object to world, and an angular velocity and acceleration (3,) in world
+    axes.
     """
 
     orientation: float | ArrayLike

@@ -1,6 +1,6 @@
-"""References in space: where the object's orientation should be, as quaternion, angular velocity and acceleration.
+"""References in space: the desired orientation as a function of time, with angular velocity and acceleration.
 
-Each is a `references.Reference` and gives at times (N,) [s] a `Motion` of quaternions (N, 4) object to world, and
+Each is a `references.Reference`: at times (N,) [s] it returns a `Motion` of quaternions (N, 4) object to world, and
 angular velocities and accelerations (N, 3) in world axes [rad/s, rad/s^2].
 """
 
@@ -18,9 +18,9 @@ from pivoting.controller.validate import Array, array, fail, number, unit_quater
 
 @dataclass(frozen=True, eq=False)
 class Turn:
-    """Turn about one axis that stays put in the world, by the angle of a planar reference.
+    """A turn about one axis that is fixed in the world, by the angle that a planar reference gives.
 
-    q = exp(angle axis) start: a constant, a minimum-jerk arc, a sine or samples, about a contact's edge or its normal.
+    The orientation is q = exp(angle axis) start. The axis may be the edge of a contact or the table's normal.
 
     Attributes:
         angle: planar reference of the angle [rad].
@@ -43,7 +43,7 @@ class Turn:
 
     @property
     def duration(self) -> float:
-        """That of the angle [s]; a plain function of time has none, and goes on for ever."""
+        """Duration of the angle's reference [s]; inf for a plain function of time, which has none."""
         return float(getattr(self.angle, "duration", math.inf))
 
     def __call__(self, times: ArrayLike) -> Motion:
@@ -54,7 +54,7 @@ class Turn:
 
 @dataclass(frozen=True, eq=False)
 class Waypoints:
-    """Rest-to-rest turns through orientations, each the shortest and in `seconds`, resting `hold` seconds between.
+    """Rest-to-rest turns through orientations, each the shortest and in `seconds`, with rests of `hold` seconds.
 
     Attributes:
         orientations: (P, 4) quaternions, P >= 2.
@@ -76,7 +76,7 @@ class Waypoints:
 
     @property
     def duration(self) -> float:
-        """From the first rest to the end of the last [s]."""
+        """Time from the first rest to the end of the last [s]."""
         return MinimumJerk((0.0,) * len(self.orientations), self.seconds, self.hold).duration
 
     @cached_property
@@ -100,7 +100,7 @@ class Waypoints:
 
 
 class SampledRotation:
-    """Orientations sampled every `dt` [s], interpolated with continuous acceleration; at rest at the last one after."""
+    """Orientations sampled every `dt` [s], interpolated with continuous acceleration; it rests at the last one."""
 
     def __init__(self, orientations: ArrayLike, dt: float):
         from scipy.spatial.transform import Rotation, RotationSpline

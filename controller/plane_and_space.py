@@ -1,7 +1,7 @@
-"""The plane and space as one thing: rigid-body quantities live in 3-D and a space says which of them are used.
+"""One description for motion in the plane and in space: everything is in 3-D, and a `Space` selects what is used.
 
-A planar problem is the spatial one seen through two constant maps: 3 of the 6 wrench components and 2 of the 3
-axes of each contact frame. So every formula (Jacobian, law, error) is written once.
+A planar problem is a spatial problem of which only 3 of the 6 wrench components and 2 of the 3 axes of each contact
+frame are used; two constant matrices select them. So every formula (Jacobian, law, error) is written only once.
 Planar coordinates are (x right, z up), the angle theta counter-clockwise, that is about -y.
 """
 
@@ -18,7 +18,7 @@ from pivoting.controller.validate import Array, array, fail, unit_quaternions
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Which components of the 3-D rigid-body quantities a problem uses.
+    """The plane or space: which components of the 3-D rigid-body quantities a problem uses.
 
     Attributes:
         dim: 2 (plane) or 3 (space).
@@ -31,7 +31,7 @@ class Space:
 
     @cached_property
     def wrench_map(self) -> Array:
-        """(nw, 6): the wrench components used, out of (force, moment) in 3-D; nw = 3 in the plane, 6 in space."""
+        """(nw, 6) matrix that selects the components used of (force, moment) in 3-D; nw is 3 in the plane, else 6."""
         if self.dim == 3:
             return np.eye(6)
         out = np.zeros((3, 6))
@@ -41,15 +41,15 @@ class Space:
 
     @cached_property
     def force_map(self) -> Array:
-        """(3, d): the axes of a contact frame (t, o, n) that carry force: (t, n) in the plane."""
+        """(3, d) matrix of the axes of a contact frame (t, o, n) along which forces act: (t, n) in the plane."""
         return np.eye(3) if self.dim == 3 else np.eye(3)[:, [0, 2]]
 
     def lift(self, vector: Array) -> Array:
-        """A (..., d) vector as (..., 3); a planar (x, z) becomes (x, 0, z)."""
+        """The vector (..., 3) of a vector (..., d); a planar (x, z) becomes (x, 0, z)."""
         return vector @ self.force_map.T
 
     def lift_inertia(self, inertia: ArrayLike) -> Array:
-        """The inertia tensor (3, 3) [kg m^2] about the CoM, in object axes; a planar scalar turns about y only."""
+        """The inertia tensor (3, 3) [kg m^2] about the CoM, in object axes; a planar number is the inertia about y."""
         if self.dim == 3:
             return array("inertia", inertia, (3, 3))
         if np.ndim(inertia) != 0:
@@ -57,7 +57,7 @@ class Space:
         return np.diag([0.0, float(np.asarray(inertia)), 0.0])
 
     def orientation(self, angle: ArrayLike) -> Array:
-        """(..., 4) quaternion object to world of planar angles (...)."""
+        """Quaternions (..., 4), object to world, of planar angles (...)."""
         half = 0.5 * np.asarray(angle, dtype=float)
         zero = np.zeros_like(half)
         return quaternion_product(self.base, np.stack([np.cos(half), zero, -np.sin(half), zero], axis=-1))
@@ -69,12 +69,12 @@ class Space:
         return np.arctan2(np.sin(turned), np.cos(turned))
 
     def axial(self, rate: ArrayLike) -> Array:
-        """(..., 3) world vector of planar rates (...) about the plane's normal."""
+        """Vectors (..., 3), world axes, of planar rates (...) about the plane's normal."""
         axis = -rotation_matrix(self.base)[:, 1]
         return np.asarray(rate, dtype=float)[..., None] * axis
 
     def lift_motion(self, motion: Motion) -> tuple[Array, Array, Array]:
-        """Quaternion (4,), angular velocity (3,) and acceleration (3,) in world axes of a `Motion` of this space."""
+        """The quaternion (4,), angular velocity (3,) and acceleration (3,) of a `Motion` of this space, world axes."""
         if self.dim == 2:
             values = []
             for name, value in zip(Motion._fields, motion, strict=True):
@@ -88,17 +88,17 @@ class Space:
 
 
 def space(dim: int, base: ArrayLike = IDENTITY) -> Space:
-    """The plane (`dim` 2, on a table of frame `base`) or space (`dim` 3)."""
+    """The plane (`dim` 2, with the table's frame `base`) or space (`dim` 3)."""
     return Space(dim, unit_quaternions("base", base, (4,)))
 
 
 def tilt(angle: float) -> Array:
-    """(4,) base of a table that rises to the right by `angle` [rad]."""
+    """The frame (4,) of a table that rises to the right by `angle` [rad]."""
     return np.array([np.cos(0.5 * angle), 0.0, -np.sin(0.5 * angle), 0.0])
 
 
 @subroutine
 def component(wrench_map, row, F0, F1, F2, M0, M1, M2):  # type: ignore[no-untyped-def]
-    """One of the nw components that are used of a wrench (F, M) in 3-D."""
+    """The component number `row` of the nw that are used of a wrench (F, M) in 3-D."""
     m = wrench_map[row]
     return m[0] * F0 + m[1] * F1 + m[2] * F2 + m[3] * M0 + m[4] * M1 + m[5] * M2

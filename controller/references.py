@@ -1,4 +1,4 @@
-"""References: where the object should be at each time, as angle, rate and acceleration; and those that have a name."""
+"""References: the desired angle of the object as a function of time, and the references that scenarios know by name."""
 
 import inspect
 import math
@@ -13,15 +13,15 @@ from pivoting.controller.validate import array, fail, number
 
 
 class Reference(Protocol):
-    """Anything that gives the desired motion at times (N,) [s]: angle, rate and acceleration, each (N,) [rad, s].
+    """The desired motion as a function of time: at times (N,) [s] the angle, rate and acceleration, each (N,) [rad, s].
 
-    In space (see `orientation_references`) orientation (N, 4), angular velocity and acceleration (N, 3). A single time
-    gives single values. After its `duration` it rests.
+    In space (see `orientation_references`) these are orientations (N, 4), angular velocities and accelerations (N, 3).
+    For a single time they are single values. A reference rests after its `duration`.
     """
 
     @property
     def duration(self) -> float:
-        """When it has come to its end [s]; inf if it goes on for ever."""
+        """The time at which the motion ends [s]; inf if it never does."""
         ...
 
     def __call__(self, times: ArrayLike) -> Motion:
@@ -31,11 +31,11 @@ class Reference(Protocol):
 
 @dataclass(frozen=True)
 class NamedReference:
-    """A reference that a scenario asks for by its name.
+    """A reference that a scenario selects by its name.
 
     Attributes:
         meaning: what the motion is, in a few words.
-        make: makes it; each of its parameters has the name of a key of the scenario, and takes its value [rad, s].
+        make: returns the reference; its parameters are named like keys of the scenario and take their values [rad, s].
     """
 
     meaning: str
@@ -43,7 +43,7 @@ class NamedReference:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """The keys of a scenario that it is made of."""
+        """The keys of a scenario on which the reference depends."""
         return tuple(inspect.signature(self.make).parameters)
 
     def __str__(self) -> str:
@@ -56,7 +56,7 @@ Make = TypeVar("Make", bound=Callable[..., Reference])
 
 
 def reference(name: str, meaning: str) -> Callable[[Make], Make]:
-    """Let scenarios ask for what the decorated function or class makes by a `name`; see `NamedReference`.
+    """Register what the decorated function or class returns under a `name` for scenarios; see `NamedReference`.
 
     Raises:
         ValueError: the name is taken.
@@ -93,7 +93,7 @@ class Constant:
 
 @dataclass(frozen=True)
 class MinimumJerk:
-    """Rest-to-rest arcs through `waypoints` [rad], each in `seconds`, resting `hold` seconds before, between, after.
+    """Rest-to-rest arcs through `waypoints` [rad], each in `seconds`; rests of `hold` seconds before, between, after.
 
     theta = theta_0 + (theta_1 - theta_0) (10 s^3 - 15 s^4 + 6 s^5), s = t / seconds (Flash and Hogan 1985).
     """
@@ -112,7 +112,7 @@ class MinimumJerk:
 
     @property
     def duration(self) -> float:
-        """From the first rest to the end of the last [s]."""
+        """Time from the first rest to the end of the last [s]."""
         arcs = len(self.waypoints) - 1
         return self.hold + arcs * (self.seconds + self.hold)
 
@@ -141,7 +141,7 @@ def _return(theta: float, theta_end: float, seconds: float, hold: float) -> Mini
 
 @dataclass(frozen=True)
 class Sine:
-    """theta = mean + amplitude sin(2 pi t / period) [rad, s]; it starts at full speed, so start slowly or small."""
+    """theta = mean + amplitude sin(2 pi t / period) [rad, s]; it starts at full speed, so keep it slow or small."""
 
     mean: float
     amplitude: float
@@ -172,7 +172,7 @@ def _sine(theta: float, amplitude: float, period: float) -> Sine:
 class Sampled:
     """Angles sampled every `dt` [s], interpolated by a quintic spline.
 
-    After the end it rests at the last angle: let the samples end at rest, or the rate jumps there.
+    After its end it rests at the last angle. Let the samples end at rest, or the rate jumps there.
     """
 
     def __init__(self, samples: ArrayLike, dt: float):

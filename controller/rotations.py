@@ -1,6 +1,6 @@
 """Rotations: quaternions (w, x, y, z), matrices, the exponential and the logarithm (Sola et al. 2018).
 
-Scalars and loops, no arrays, where kernels call.
+Functions that kernels call work with scalars and loops, not with arrays.
 """
 
 from typing import Any
@@ -17,7 +17,7 @@ _SMALL = 1e-4  # [rad]: below, the series is more accurate than the quotient
 
 @subroutine
 def cross(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
-    """a x b, as three scalars: no arrays in the inner loops."""
+    """The cross product a x b, as three scalars."""
     return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
 
 
@@ -32,7 +32,7 @@ def turned(w, x, y, z, a, b, c):  # type: ignore[no-untyped-def]
 
 @subroutine
 def into(R, a0, a1, a2):  # type: ignore[no-untyped-def]
-    """R^T a: a world vector in object axes, as three scalars."""
+    """R^T a, a world vector turned into object axes, as three scalars."""
     return (
         R[0, 0] * a0 + R[1, 0] * a1 + R[2, 0] * a2,
         R[0, 1] * a0 + R[1, 1] * a1 + R[2, 1] * a2,
@@ -51,18 +51,18 @@ def fill_product(p, q, out):  # type: ignore[no-untyped-def]
 
 
 def components(vectors: ArrayLike) -> list[Any]:
-    """The components of vectors (..., n): n arrays (...), or n floats of one vector, with which Python is faster."""
+    """The components of vectors (..., n): n arrays (...); or, of one vector, n floats, with which Python is faster."""
     array = np.asarray(vectors, dtype=float)
     return array.tolist() if array.ndim == 1 else [array[..., i] for i in range(array.shape[-1])]
 
 
 def stacked(values: list[Any]) -> Array:
-    """(..., n) of n components (...)."""
+    """The vectors (..., n) with these n components (...)."""
     return np.array(values) if isinstance(values[0], float) else np.stack(values, axis=-1)
 
 
 def quaternion_product(p: ArrayLike, q: ArrayLike) -> Array:
-    """Hamilton product of (..., 4) quaternions (w, x, y, z), shapes broadcast."""
+    """The Hamilton product of quaternions (..., 4), ordered (w, x, y, z); shapes broadcast."""
     out: list[Any] = [0.0] * 4
     fill_product(components(p), components(q), out)
     return stacked(out)
@@ -85,7 +85,7 @@ def fill_rotation(q, out):  # type: ignore[no-untyped-def]
 
 
 def rotation_matrix(quaternion: Array) -> Array:
-    """(3, 3) rotation matrix of one quaternion (4,)."""
+    """The rotation matrix (3, 3) of one quaternion (4,)."""
     out = np.empty((3, 3))
     fill_rotation(np.ascontiguousarray(quaternion, dtype=float), out)
     return out
@@ -119,12 +119,12 @@ def turn(orientation, vector, out):  # type: ignore[no-untyped-def]
 
 
 def rotated(orientation: ArrayLike, point: ArrayLike) -> Array:
-    """(..., 3) points turned by unit quaternions (..., 4), shapes broadcast."""
+    """Points (..., 3) turned by unit quaternions (..., 4); shapes broadcast."""
     return stacked(list(turned(*components(orientation), *components(point))))
 
 
 def exponential(vector: Array) -> Array:
-    """(..., 4) unit quaternions of rotation vectors (..., 3) [rad]."""
+    """The unit quaternions (..., 4) of rotation vectors (..., 3) [rad]."""
     angle = np.linalg.norm(vector, axis=-1, keepdims=True)
     return np.concatenate([np.cos(0.5 * angle), 0.5 * np.sinc(angle / (2.0 * np.pi)) * vector], axis=-1)
 
@@ -138,7 +138,7 @@ def fill_differences(orientation, out):  # type: ignore[no-untyped-def]
 
 @subroutine
 def fill_hat(x, y, z, out):  # type: ignore[no-untyped-def]
-    """Write the matrix (3, 3) with out u = (x, y, z) x u."""
+    """Write the matrix (3, 3) of a cross product: out u = (x, y, z) x u."""
     out[0, 0] = out[1, 1] = out[2, 2] = 0.0
     out[0, 1], out[0, 2], out[1, 2] = -z, y, -x
     out[1, 0], out[2, 0], out[2, 1] = z, -y, x
@@ -146,7 +146,7 @@ def fill_hat(x, y, z, out):  # type: ignore[no-untyped-def]
 
 @subroutine
 def add_product(scale, A, B, out, row, column):  # type: ignore[no-untyped-def]
-    """Add scale A B, (3, 3), to the block of out that begins at this row and column."""
+    """Add scale A B (3, 3) to the block of out that begins at this row and column."""
     for i in range(3):
         for j in range(3):
             out[row + i, column + j] += scale * (A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j])

@@ -17,18 +17,19 @@ SOLVED, INACCURATE, FAILED, BOUNDED, UNCERTIFIED = range(len(STATUS))
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """An answer with its certificate.
+    """An answer to a wrench problem, with the residual that certifies it.
 
     Attributes:
-        problem: what was solved.
+        problem: the problem that was solved.
         wrench: (nw,) applied wrench w about the CoM, in the problem's frame (the object's) [N, N m].
         force: (K, d) contact forces, (f_t, f_n) or (f_t, f_o, f_n), in each contact's frame [N].
-        residual: relative KKT residual, computed here whatever the solver said; with edges > 0 that of the pyramids.
-        status: "solved"; "inscribed" (solved, but for inscribed pyramids: feasible, and not the optimum of `problem`);
+        residual: relative KKT residual, computed here and not by the solver; with edges > 0 that of the problem with
+            pyramids.
+        status: "solved"; "inscribed" (solved with inscribed pyramids: feasible, but not the optimum of `problem`);
             "inaccurate" (residual above tolerance) or "failed" (no finite answer).
-        method: the method that gave it.
+        method: the method that gave the answer.
         seconds: wall time of the solver alone.
-        edges: of the pyramids that stood for the cones in space; 0: the cones themselves.
+        edges: number of edges of the pyramids that replaced the cones in space; 0 for the cones themselves.
     """
 
     problem: WrenchProblem = field(repr=False)
@@ -42,7 +43,7 @@ class Solution:
 
     @property
     def objective(self) -> float:
-        """1/2 w'Q_w w + 1/2 f'Q_f f, the program as the notes state it (their printed Obj is twice that)."""
+        """The cost 1/2 w'Q_w w + 1/2 f'Q_f f, as the notes define it (the number that they print is twice this)."""
         return self.problem.objective(self.wrench, self.force)
 
 
@@ -57,10 +58,10 @@ def certified(
     tolerance: float = TOLERANCE,
     edges: int = 0,
 ) -> Solution:
-    """The answer of a solver, wrench (nw,) and force (K d,), as a Solution that carries its certificate.
+    """Certify the answer of a solver, wrench (nw,) and force (K d,), and return it as a `Solution`.
 
     Args:
-        message: what the solver reported, for the error.
+        message: what the solver reported; an error quotes it.
 
     Raises:
         SolveError: the residual is above `tolerance`, or the answer is not finite.

@@ -1,4 +1,4 @@
-"""The notes' second figure as geometry: composite wrench cone, the set that cancels the load, and the optimum on it."""
+"""The geometry of the notes' second figure: the contact's wrench cone, the wrenches that balance, and the optimum."""
 
 from typing import NamedTuple
 
@@ -7,19 +7,19 @@ from pivoting.controller.validate import Array, fail
 
 
 class SolutionSpace(NamedTuple):
-    """A planar problem in wrench space (F_u, F_v, M), object axes [N, N, N m]; or many of them, (..., 3).
+    """A planar problem, or many of them, drawn in the space of wrenches (F_u, F_v, M), object axes [N, N, N m].
 
     J_c has two columns, so the contact's composite wrench cone {J f} is a flat sector of the 3-D wrench space, and the
     wrenches that balance, {required - J f}, are its mirror image with the apex moved to `required`, where the contact
     carries nothing. The optimum is the cheapest point of that set.
 
     Attributes:
-        cone: (..., P, 3) polygon of the contact's wrenches J f, apex (or floor) first.
+        cone: (..., P, 3) polygon of the contact's wrenches J f; its apex, or its floor, comes first.
         admissible: (..., P, 3) polygon of the applied wrenches that balance: required - cone.
-        required: (..., 3) what contact and applied wrench make together (-m g for balance).
+        required: (..., 3) the wrench that contact and applied wrench must make together (-m g for balance).
         wrench: (..., 3) the applied wrench w.
-        contact: (..., 3) the contact's part, J f.
-        lacking: (..., 3) required - w - J f: nothing, unless bounds did not allow what is required.
+        contact: (..., 3) the wrench J f of the contact.
+        lacking: (..., 3) required - w - J f; zero unless bounds did not allow what is required.
     """
 
     cone: Array
@@ -33,13 +33,13 @@ class SolutionSpace(NamedTuple):
 def solution_space(
     jacobian: Array, mu: float, f_min: float, required: Array, wrench: Array, force: Array, reach: float | None = None
 ) -> SolutionSpace:
-    """The picture of planar problems with one contact and of their answers, as they are: nothing is solved here.
+    """The geometry of planar problems with one contact and of their given answers; it solves nothing.
 
     Args:
         jacobian: (..., 3, 2).
-        mu: friction that may be used.  f_min: floor of the normal force [N].
+        mu: friction that may be used.  f_min: least normal force [N].
         required, wrench: (..., 3) [N, N m].  force: (..., 2) the contact's [N].
-        reach: largest normal force that is drawn [N]; default twice the load or the answers', whichever is larger.
+        reach: largest normal force that is drawn [N]; by default twice the load or the answers', whichever is larger.
 
     Raises:
         ValueError: the problem is not planar or has several contacts, whose cones do not fit one picture.

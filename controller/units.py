@@ -1,4 +1,4 @@
-"""Units inside the programs: forces in weights and lengths in levers, so that what is solved is of the order of one."""
+"""The units used inside the programs: forces in weights, lengths in levers, so that all numbers are of order one."""
 
 from typing import NamedTuple
 
@@ -7,11 +7,12 @@ from pivoting.controller.validate import Array
 
 
 class Units(NamedTuple):
-    """What one stands for.
+    """The size of one unit of each quantity.
 
-    force: [N] the weight, or what accelerates the object by 1 m/s^2 without gravity.
-    length: [m] the lever from the CoM to the contacts' mean, or to the farthest contact.
-    wrench: (nw,) [N, N m].  pose: (nw,) [m, rad].
+    Attributes:
+        force: the weight [N]; without gravity, the force that accelerates the object by 1 m/s^2.
+        length: the lever from the CoM to the contacts' mean, or to the farthest contact [m].
+        wrench: (nw,) [N, N m].  pose: (nw,) [m, rad].
     """
 
     force: float
@@ -21,13 +22,13 @@ class Units(NamedTuple):
 
 
 def lever(points: Array) -> float:
-    """[m] from the CoM to the mean of points (K, d); 0 if that is no more than rounding."""
+    """Distance [m] from the CoM to the mean of points (K, d); 0 if it is no more than rounding."""
     reach, farthest = float(np.linalg.norm(points.mean(axis=0))), float(np.linalg.norm(points, axis=1).max())
     return reach if reach > 1e-9 * farthest else 0.0
 
 
 def units(mass: float, gravity: Array, points: Array, dim: int) -> Units:
-    """Of an object [kg] in `gravity` (3,) [m/s^2] with contacts at `points` (K, 3) from its CoM [m]."""
+    """The units for an object [kg] in `gravity` (3,) [m/s^2] with contacts at `points` (K, 3) from its CoM [m]."""
     force = mass * (float(np.linalg.norm(gravity)) or 1.0)
     length = lever(points) or float(np.linalg.norm(points, axis=1).max()) or 1.0
     turns = 2 * dim - 3

@@ -1,4 +1,4 @@
-"""Checks of what users hand in: one error that names the argument, its value and what is allowed."""
+"""Checks of arguments; their error names the argument, its value and what is allowed."""
 
 from math import hypot
 
@@ -14,7 +14,7 @@ class InputError(PivotingError, ValueError):
 
 
 def fail(name: str, value: object, allowed: str) -> InputError:
-    """The error for an argument `name` whose `value` is not `allowed`."""
+    """The error to raise for an argument `name` whose `value` is not `allowed`."""
     shown = str(value.tolist()) if isinstance(value, np.ndarray) else repr(value)
     return InputError(f"{name} = {shown if len(shown) < 120 else shown[:117] + '...'}: must be {allowed}")
 
@@ -43,7 +43,7 @@ def _shown(shape: tuple[int | None, ...]) -> str:
 
 
 def unit_quaternions(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
-    """The same for quaternions of unit length, the last axis of `shape`, to 1e-6."""
+    """A read-only copy of quaternions, along the last axis of `shape`, whose length is 1 to within 1e-6."""
     out = array(name, value, shape)
     length = np.array(hypot(*out.tolist())) if out.ndim == 1 else np.linalg.norm(out, axis=-1)
     if np.abs(length - 1.0).max(initial=0.0) > 1e-6:

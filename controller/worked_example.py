@@ -1,4 +1,4 @@
-"""The notes' worked example: what they print, what the program's solvers give, and whether the digits agree."""
+"""The worked example of the notes: the numbers that they print, those of each solver, and whether the digits agree."""
 
 from dataclasses import dataclass
 
@@ -20,9 +20,9 @@ class Example:
     """A problem with known numbers.
 
     Attributes:
-        name, summary: what it is.
+        name, summary: what the example is called, and what it is.
         incline: how far the table rises to the right [rad].
-        expected: quantity: the digits, as they are written.
+        expected: the digits of each quantity, as they are printed.
     """
 
     name: str
@@ -31,13 +31,13 @@ class Example:
     expected: dict[str, str]
 
     def controller(self) -> WrenchController:
-        """a = 1 m, m = 1 kg, g = 10 m/s^2, mu = 0.3, Q = I; gravity in the table's frame."""
+        """The controller: a = 1 m, m = 1 kg, g = 10 m/s^2, mu = 0.3, Q = I, and gravity in the table's frame."""
         corner = Contact((-0.5, -0.5), mu=0.3)
         gravity = (-10.0 * np.sin(self.incline), -10.0 * np.cos(self.incline))
         return WrenchController(Body(1.0, 1.0 / 6.0), [corner], Law.static(), gravity, Q_w=np.eye(3))
 
     def problem(self) -> WrenchProblem:
-        """Balance at theta = 30 deg."""
+        """The wrench problem of the example: balance at theta = 30 deg."""
         return self.controller().problem(Motion(THETA))
 
 
@@ -74,14 +74,15 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Digit:
-    """One number of an example, from one method.
+    """One number of an example, as one method computes it.
 
     Attributes:
-        example, method, quantity: which.
-        expected: the digits as written.  value: what the method gave.
-        agrees: |value - expected| is at most one unit of the last digit written. One, not a half: the notes' numbers
-            come from a solver with a tolerance of 1e-6, and its tau = -0.10201 is -0.1020047, which rounds to -0.10200.
-        rounds: value rounds to exactly these digits.
+        example, method, quantity: which number it is.
+        expected: the printed digits.  value: what the method gave.
+        agrees: whether |value - expected| is at most one unit of the last printed digit. It is one unit, not a half,
+            because the notes' numbers come from a solver with a tolerance of 1e-6: their tau = -0.10201 is -0.1020047,
+            which rounds to -0.10200.
+        rounds: whether value rounds to exactly these digits.
     """
 
     example: str
@@ -94,14 +95,14 @@ class Digit:
 
 
 def quantities(solution: Solution) -> dict[str, float]:
-    """The numbers that the notes print, of a planar solution with one contact."""
+    """The quantities that the notes print, taken from a planar solution with one contact."""
     (f_t, f_n), (f_x, f_y, tau) = solution.force[0], solution.wrench
     cost = solution.objective
     return {"f_t": f_t, "f_n": f_n, "f_x": f_x, "f_y": f_y, "tau": tau, "x'Qx": 2.0 * cost, "x'Qx/2": cost}
 
 
 def compare(example: Example, method: str) -> tuple[list[Digit], Solution]:
-    """Every number of `example` against `method`; an answer that is not certified is shown with its status."""
+    """Compare every number of `example` with what `method` gives; an answer without a certificate shows its status."""
     try:
         solution = solve(example.problem(), method)
     except SolveError as error:
@@ -118,5 +119,5 @@ def compare(example: Example, method: str) -> tuple[list[Digit], Solution]:
 
 
 def compare_all() -> list[tuple[list[Digit], Solution]]:
-    """Every example by every method that is installed."""
+    """Compare the numbers of every example with those of every method that is installed."""
     return [compare(example, method) for example in EXAMPLES for method in methods()]

@@ -1,4 +1,4 @@
-"""Bounds on the wrench that may be applied, and on how fast it may change."""
+"""Bounds on the applied wrench, and on how fast it may change."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from pivoting.controller.validate import Array, fail
 
 
 class Ball(NamedTuple):
-    """|rows w| <= radius, or |rows (w - w_before)| <= radius dt where `rate`."""
+    """One bound: |rows w| <= radius or, if `rate` is set, |rows (w - w_before)| <= radius dt."""
 
     rows: Array
     radius: float
@@ -18,7 +18,7 @@ class Ball(NamedTuple):
 
 
 class Stacked(NamedTuple):
-    """b balls: rows (r, nw) of all, where each one's begin and the last one's end (b + 1,), radius (b,), rate (b,)."""
+    """b balls as arrays: all rows (r, nw), where each one's begin and the last end (b + 1,), radius and rate (b,)."""
 
     rows: Array
     first: NDArray[np.int64]
@@ -28,11 +28,11 @@ class Stacked(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class WrenchBounds:
-    """What an actuator can give. Everything is of the wrench in object axes, about the CoM; inf is no bound.
+    """The bounds of an actuator, on the wrench about the CoM in object axes; inf stands for no bound.
 
     Attributes:
         force: largest |F| [N].  moment: largest |M| [N m].
-        component: (3,) in the plane or (6,), largest |w_i| [N, N m]; None: no such bounds.
+        component: (3,) in the plane or (6,), largest |w_i| [N, N m]; None for no such bounds.
         force_rate, moment_rate: largest |dF/dt| [N/s] and |dM/dt| [N m/s], in object axes.
     """
 
@@ -74,11 +74,11 @@ class WrenchBounds:
 
     @property
     def rated(self) -> bool:
-        """Whether a rate is bounded."""
+        """Whether the rate of change is bounded."""
         return min(self.force_rate, self.moment_rate) < np.inf
 
     def balls(self, nw: int) -> tuple[Ball, ...]:
-        """The bounds on a wrench of `nw` = 3 (plane) or 6 components, those that bound something."""
+        """The finite bounds, on a wrench of `nw` components: 3 in the plane, 6 in space."""
         dim = 2 if nw == 3 else 3
         force, moment = np.eye(nw)[:dim], np.eye(nw)[dim:]
         out = [Ball(force, self.force, False), Ball(moment, self.moment, False)]
@@ -101,10 +101,10 @@ class WrenchBounds:
         )
 
     def excess(self, wrench: Array, before: Array | None = None, dt: float = 1.0) -> float:
-        """By how much a wrench (nw,), or any of many (..., nw), exceeds a bound, relative to that bound; <= 0: none.
+        """The greatest excess of wrenches (..., nw) over a bound, relative to that bound; <= 0 if there is none.
 
-        `before`: likewise, the wrench applied `dt` [s] earlier; None leaves the rates out. A wrench that is not a
-        number gives nan: it is within no bound.
+        `before` contains the wrenches applied `dt` [s] earlier; None leaves the bounds on rates out. A wrench that is
+        not a number is within no bound, and gives nan.
         """
         nw = wrench.shape[-1]
         last = np.broadcast_to(wrench if before is None else before, wrench.shape)
@@ -115,13 +115,13 @@ class WrenchBounds:
 
 @kernel
 def fill_excess(stacked, wrench, before, dt, out):  # type: ignore[no-untyped-def]
-    """Write by how much each of wrenches (W, nw) exceeds a bound, relative to it, into out (W,); -1 without any bound.
+    """Write the relative excess of each of W wrenches (W, nw) over the bounds into out (W,); -1 if there are no bounds.
 
-    Returns the greatest of those that are numbers.
+    Returns the greatest excess that is a number.
 
     Args:
         stacked: of `WrenchBounds.stacked`.
-        before: (W, nw) applied `dt` [s] earlier; the wrenches themselves leave rates out.
+        before: (W, nw) applied `dt` [s] earlier; if they are the wrenches themselves, bounds on rates have no effect.
     """
     most = -1.0
     for i in range(wrench.shape[0]):
@@ -137,7 +137,7 @@ def fill_excess(stacked, wrench, before, dt, out):  # type: ignore[no-untyped-de
 
 @subroutine
 def size_over(stacked, k, wrench, before, dt):  # type: ignore[no-untyped-def]
-    """|rows v| over the radius of ball k; v is a wrench (nw,), or its change from `before` over dt for a rate."""
+    """|rows v| / radius of ball k, where v is a wrench (nw,) or, for a rate, its change from `before` divided by dt."""
     square = 0.0
     for row in range(stacked.first[k], stacked.first[k + 1]):
         value = 0.0
@@ -150,7 +150,7 @@ def size_over(stacked, k, wrench, before, dt):  # type: ignore[no-untyped-def]
 
 @subroutine
 def farthest_exceeded(stacked, wrench):  # type: ignore[no-untyped-def]
-    """The ball, not of a rate, that a wrench (nw,) exceeds the farthest; -1 if it is within all."""
+    """The ball, among those without a rate, that a wrench (nw,) exceeds most; -1 if it is within all of them."""
     found, worst = -1, 1.0
     for k in range(stacked.radius.shape[0]):
         size = -1.0 if stacked.rate[k] else size_over(stacked, k, wrench, wrench, 1.0)
@@ -161,7 +161,7 @@ def farthest_exceeded(stacked, wrench):  # type: ignore[no-untyped-def]
 
 @subroutine
 def begin_multiplier(stacked, k, Q_w, root):  # type: ignore[no-untyped-def]
-    """Make `root` (6,) ready for `next_multiplier`: (multiplier, the last, its 1 / size - 1, bracket, unit)."""
+    """Initialise `root` (6,) for `next_multiplier`: (multiplier, the last, its 1 / size - 1, bracket, unit)."""
     row = stacked.rows[stacked.first[k]]
     for j in range(6):
         root[j] = 0.0
@@ -172,9 +172,10 @@ def begin_multiplier(stacked, k, Q_w, root):  # type: ignore[no-untyped-def]
 
 @subroutine
 def next_multiplier(root, size):  # type: ignore[no-untyped-def]
-    """Write the multiplier to try after root[0] gave `size` over the radius, which falls as the multiplier grows.
+    """Write the next multiplier to try, after root[0] gave `size`, |rows w| over the radius.
 
-    A secant in 1 / size, which is nearly a line (as in trust regions, More and Sorensen 1983), within a bracket.
+    The size falls as the multiplier grows. The step is a secant step in 1 / size, which is nearly linear (as in trust
+    regions, More and Sorensen 1983), safeguarded by a bracket.
     """
     now, last, value = root[0], root[1], 1.0 / size - 1.0
     if value < 0.0:
@@ -192,9 +193,10 @@ def next_multiplier(root, size):  # type: ignore[no-untyped-def]
 
 @subroutine
 def fill_heavier(stacked, k, multiplier, Q_w, out):  # type: ignore[no-untyped-def]
-    """Write Q_w + multiplier rows' rows of ball k: where that makes |rows w| the radius, w is the best within it.
+    """Write the heavier weight Q_w + multiplier rows' rows, which keeps a wrench within ball k.
 
-    The Lagrangian of the bound, 1/2 multiplier (|rows w|^2 - radius^2), is a weight.
+    With the multiplier for which |rows w| is the radius, w is the best wrench within the ball: the term that the bound
+    adds to the Lagrangian, 1/2 multiplier (|rows w|^2 - radius^2), acts like a weight.
     """
     for i in range(out.shape[0]):
         for j in range(out.shape[0]):

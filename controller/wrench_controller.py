@@ -1,6 +1,7 @@
-"""The controller: a belief about object, contacts and gravity, a law, and weights; it states and solves the problem.
+"""The controller: what it believes about object, contacts and gravity, its law and its weights make wrench problems.
 
-The same compiled functions serve `problem` (one state, for people) and `step_worlds` (the loop, many worlds).
+`problem`, which makes one problem for one state, and `step_worlds`, the loop over many worlds, use the same compiled
+functions.
 """
 
 from collections.abc import Sequence
@@ -25,18 +26,18 @@ from pivoting.controller.wrench_problem import WrenchProblem, wrench_weight
 
 @dataclass(frozen=True, eq=False)
 class WrenchController:
-    """At each state, the problem whose answer is the smallest wrench that moves the object as the law wants.
+    """The controller: for each state of the object it makes the problem of the smallest wrench that the law requires.
 
     Attributes:
         body: mass and inertia as believed.
         contacts: the contacts that are to stick, all planar or all spatial.
         law: static, quasi-dynamic (with the velocity or as in the notes) or dynamic.
         gravity: (d,) in world axes [m/s^2]; in the plane (x, z), or (3,) for a plane that is not x-z.
-        base: (4,) quaternion of the table in the world; in the plane theta is measured from it, in space a `Horizon`
-            takes the table's axes from it.
-        margin: share of mu kept unused.
-        Q_w, Q_f: weights in object axes; Q_w defaults to a characteristic length of |pivot|, and the radius if it
-            rolls (see `wrench_weight`).
+        base: (4,) quaternion of the table in the world. In the plane theta is measured from it; in space only a
+            `Horizon` uses it, for the axes of the table.
+        margin: share of mu that is kept in reserve.
+        Q_w, Q_f: weights of wrench (object axes) and contact forces. By default Q_w is `wrench_weight` with the
+            distance from the CoM to the contacts as its length, plus the radius if the object rolls.
     """
 
     body: Body
@@ -84,12 +85,12 @@ class WrenchController:
 
     @cached_property
     def space(self) -> Space:
-        """The plane on this table, or space."""
+        """The space in which the object moves: the plane, with angles from this table, or space."""
         return space(self.contacts[0].dim, self.base)
 
     @cached_property
     def belief(self) -> Belief:
-        """The arrays of the compiled loop."""
+        """What the controller believes, as the arrays that the compiled loop needs."""
         here = self.space
         table = rotation_matrix(here.base)
         points = np.array([here.lift(contact.point) for contact in self.contacts])
@@ -113,13 +114,13 @@ class WrenchController:
 
     @cached_property
     def units(self) -> Units:
-        """In which its programs are stated."""
+        """The units of force and length that suit this object and its contacts."""
         belief = self.belief
         return units(belief.object.mass, belief.object.gravity, belief.contacts.points, self.space.dim)
 
     @property
     def widths(self) -> tuple[int, int]:
-        """nw, the numbers of a wrench, and K d, those of all contact forces."""
+        """The sizes of a wrench (nw) and of all contact forces together (K d)."""
         return len(self.Q_w), len(self.Q_f)
 
     def workspace(self) -> tuple[tuple[Any, ...] | None, ...]:
@@ -129,18 +130,18 @@ class WrenchController:
         return own, *workspace(nw, len(self.contacts), self.space.dim)
 
     def jacobian(self, orientation: Array) -> Array:
-        """(nw, K d) contact Jacobian in object axes at an orientation (4,), object axes to world."""
+        """The contact Jacobian (nw, K d), in object axes, at an orientation (4,), object axes to world."""
         still = np.zeros(3)
         return self._stated((orientation, still), (orientation, still, still))[0]
 
     def problem(
         self, state: Motion, desired: Motion | None = None, *, external: ArrayLike | None = None
     ) -> WrenchProblem:
-        """The wrench problem, in object axes, at `state` (acceleration not used), reference at `desired`.
+        """The wrench problem, in object axes, for an object at `state` that should be at `desired`.
 
         Args:
-            state: measured.
-            desired: left out, the object is to stay where it is.
+            state: the measured state; its acceleration is not used.
+            desired: the reference; by default the object is to stay where it is.
             external: (nw,) known wrench on the object besides gravity, contacts and the controller's own, such as that
                 of damped joints, about the CoM, object axes [N, N m].
         """

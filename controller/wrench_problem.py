@@ -1,4 +1,4 @@
-"""The wrench problem: the smallest wrench, with contact forces inside their cones, that gives what is required."""
+"""The wrench problem: find the smallest wrench that, with contact forces inside their cones, makes what is required."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +13,7 @@ from pivoting.controller.validate import Array, array, fail, number, positive_de
 
 
 class StandardForm(NamedTuple):
-    """min 1/2 x'P x  s.t.  A x = b,  C x <= d  with x = (f, w): the notes' standard QP (erratum 1: f comes first)."""
+    """The notes' standard form: min 1/2 x'P x s.t. A x = b, C x <= d, with x = (f, w) (erratum 1: f comes first)."""
 
     P: Array
     A: Array
@@ -24,21 +24,23 @@ class StandardForm(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class WrenchProblem:
-    """min 1/2 w'Q_w w + 1/2 f'Q_f f  s.t.  J f + w = required, each contact force in its truncated friction cone.
+    """The problem of the smallest wrench w, together with contact forces f, that makes the required wrench.
 
-    Balance, quasi-dynamic and dynamic pivoting are this one problem with another right-hand side: `required` is
-    -m g for balance and M a - m g for motion. Plane: nw = 3, d = 2; space: nw = 6, d = 3. Contact forces are ordered
-    (f_t, f_n) or (f_t, f_o, f_n), contact after contact; wrenches are (force, moment about the CoM). The frame is that
-    of J and `required`: the object's, in the notes and in everything built here.
+    min 1/2 w'Q_w w + 1/2 f'Q_f f  s.t.  J f + w = required, each contact force in its truncated friction cone.
 
-    Always feasible: f = (0, f_min) is in the cones and w = required - J f balances it (erratum 6).
+    Balance, quasi-dynamic and dynamic pivoting are this one problem with different right-hand sides: `required` is
+    -m g for balance and M a - m g for motion. In the plane nw = 3 and d = 2, in space nw = 6 and d = 3. Contact forces
+    are ordered (f_t, f_n) or (f_t, f_o, f_n), contact after contact; wrenches are (force, moment about the CoM). J and
+    `required` are in the same frame, which is that of the object in the notes and in this package.
+
+    The problem is always feasible: f = (0, f_min) is in the cones, and w = required - J f balances it (erratum 6).
 
     Attributes:
         jacobian: (nw, K d) contact Jacobian J_c.
-        required: (nw,) wrench that contact and applied wrench must make together [N, N m].
+        required: (nw,) the wrench that contacts and applied wrench must make together [N, N m].
         mu: (K,) friction coefficients, > 0.
-        f_min: (K,) floors of the normal forces [N], >= 0.
-        margin: share of each mu kept unused, in [0, 1): the cones are planned with (1 - margin) mu.
+        f_min: (K,) least normal forces [N], >= 0.
+        margin: share of each mu that is kept in reserve, in [0, 1): the cones have (1 - margin) mu.
         Q_w: (nw, nw) and Q_f: (K d, K d), symmetric positive definite weights.
 
     Raises:
@@ -103,14 +105,14 @@ class WrenchProblem:
         return (1.0 - self.margin) * self.mu
 
     def objective(self, wrench: Array, force: Array) -> float:
-        """1/2 w'Q_w w + 1/2 f'Q_f f; force (K, d) or (K d,)."""
+        """The cost 1/2 w'Q_w w + 1/2 f'Q_f f of an answer; force is (K, d) or (K d,)."""
         f = np.ravel(force)
         return float(0.5 * (wrench @ self.Q_w @ wrench + f @ self.Q_f @ f))
 
     def residual(self, wrench: Array, force: Array, *, edges: int = 0) -> float:
-        """Relative KKT residual of an answer, see `kkt_residual.kkt_residual`; nan if it is not finite.
+        """The relative KKT residual of an answer, see `kkt_residual.kkt_residual`; nan if the answer is not finite.
 
-        With `edges` > 0 that of the program whose cones in space are replaced by inscribed pyramids.
+        With `edges` > 0 it is the residual of the problem whose cones in space are replaced by inscribed pyramids.
         """
         w, f = np.array(wrench, dtype=float), np.array(force, dtype=float).ravel()
         stated = self.jacobian, self.required, self.Q_w, self.Q_f, self.mu_planned, self.f_min
@@ -123,10 +125,11 @@ class WrenchProblem:
         return polygon(edges)
 
     def standard_form(self, *, edges: int = 0) -> StandardForm:
-        """The problem as the notes' QP in x = (f, w), with rows of C for each contact: floor, edges of the cone.
+        """The problem as the quadratic program of the notes, in x = (f, w).
 
-        In the plane the edges are right and left. In space the cone is replaced by the inscribed pyramid of `edges`
-        faces, whose answers are feasible for the cone and, in general, not optimal.
+        For each contact, the rows of C are the floor and the sides of the cone. In the plane these are the right and
+        the left side. In space the cone is replaced by the inscribed pyramid with `edges` faces; an answer is then
+        feasible for the cone but, in general, not optimal.
 
         Raises:
             ValueError: in space without `edges`, where the cones are not linear; in the plane with them.
@@ -144,10 +147,10 @@ class WrenchProblem:
 
 
 def wrench_weight(dim: int, length: float = 1.0) -> Array:
-    """Q_w = diag(1, ..., 1 / length^2): moments count as forces at a lever of `length` [m].
+    """The weight Q_w = diag(1, ..., 1 / length^2), with which moments count like forces at a lever of `length` [m].
 
-    length = 1 is the identity of the notes, for which "minimal" depends on the unit of length; the distance from the
-    CoM to the contact is the natural choice. Returns (3, 3) for dim 2, (6, 6) for dim 3.
+    With length = 1 it is the identity of the notes, for which "smallest" depends on the unit of length. The distance
+    from the CoM to the contact is the natural choice. Returns (3, 3) for dim 2 and (6, 6) for dim 3.
     """
     lever = number("length", length, above=0.0, unit="m")
     return np.diag([1.0] * dim + [lever**-2] * (1 if dim == 2 else 3))

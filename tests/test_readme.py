@@ -72,7 +72,7 @@ def test_the_studys_tables_are_those_of_its_results(study: str) -> None:
 
 
 def test_recorded_evidence_is_within_its_bounds() -> None:
-    for name in ("evidence", "evidence_space", "loop", "formulations", "effort", "objects"):
+    for name in ("evidence", "evidence_space", "loop", "formulations", "effort", "objects", "engines"):
         kept = saved(name)
         assert kept["quick"] is False
         assert {"processor", "cores", "python", "versions"} <= set(kept["machine"])

@@ -59,6 +59,20 @@ def test_links_and_pictures_lead_somewhere() -> None:
             assert anchor in [re.sub(r"[^\w -]", "", head).lower().replace(" ", "-") for head in heads], target
 
 
+def test_every_picture_is_made_by_make_figures_or_listed_as_a_screenshot() -> None:
+    shown = {
+        (page.parent / target).resolve().relative_to(ROOT).as_posix()
+        for page, target in links()
+        if Path(target).suffix in (".png", ".gif")
+    }
+    recipe = re.search(r"^figures:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert recipe is not None
+    made = set(re.findall(r"docs/[\w-]+\.(?:png|gif)", recipe[1]))
+    screenshots = set(re.findall(r"^\| `(docs/[\w-]+\.png)`", (ROOT / "CONTRIBUTING.md").read_text(), re.MULTILINE))
+    assert not made & screenshots
+    assert shown == made | screenshots
+
+
 @pytest.mark.parametrize("room", ["controller", "models", "sim"])
 def test_the_reference_has_every_name_that_is_exported(room: str) -> None:
     page = (ROOT / f"docs/api/{room}.md").read_text()
@@ -78,11 +92,12 @@ def test_the_front_page_of_the_reference_has_every_name() -> None:
     assert re.findall(r"\[`(\w+)`\]", (ROOT / "docs/api/pivoting.md").read_text()) == exported
 
 
-def test_the_page_of_results_is_made_of_the_committed_results() -> None:
-    call = [sys.executable, ROOT / "benchmarks/results_page.py"]
+@pytest.mark.parametrize("name", ["results", "engines"])
+def test_pages_of_measured_figures_are_made_of_the_committed_results(name: str) -> None:
+    call = [sys.executable, ROOT / "benchmarks/results_page.py", name]
     page = subprocess.run(call, capture_output=True, text=True, check=True).stdout
-    assert page == (ROOT / "docs/results.md").read_text(), "make figures"
-    template = (ROOT / "docs/results.template.md").read_text()
+    assert page == (ROOT / f"docs/{name}.md").read_text(), "make figures"
+    template = (ROOT / f"docs/{name}.template.md").read_text().partition("\n## Measured once, by hand\n")[0]
     prose = re.sub(r"\{\{.*?\}\}|`[^`]*`|\]\(.*?\)", "", template, flags=re.DOTALL)
     measured = re.findall(r"\d+\.\d+|\de-\d+", prose)
     assert set(measured) <= {"0.05", "1.5", "1e-5", "1e-10"}, "a figure that is not taken from a result"

@@ -1,1 +1,1 @@
-"""What is compiled: the closed forms, the interior point, and how functions are compiled and kept."""
+"""The compiled code: closed forms, interior point and the step of the loop; and how functions are compiled and kept."""

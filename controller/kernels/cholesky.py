@@ -1,4 +1,4 @@
-"""Small dense symmetric systems, in place and without allocation: the inner loop of the contact kernels."""
+"""Cholesky factors of small dense systems, in place and without allocation: the inner loop of the contact solvers."""
 
 import numpy as np
 from pivoting.controller.kernels.compilation import subroutine
@@ -8,9 +8,9 @@ TINY = 1e-14  # least pivot, relative to its diagonal entry: a matrix that round
 
 @subroutine
 def factor(M, n):  # type: ignore[no-untyped-def]
-    """Overwrite the upper triangle of the leading (n, n) block of M with U of M = U'U (row operations: they vectorise).
+    """Factor M = U'U: overwrite the upper triangle of the leading (n, n) block of M with U.
 
-    The diagonal of U is stored inverted. nan stays nan.
+    It works by rows, which vectorises. The diagonal of U is stored inverted. A nan stays nan.
     """
     for k in range(n):
         pivot = M[k, k]
@@ -28,7 +28,7 @@ def factor(M, n):  # type: ignore[no-untyped-def]
 
 @subroutine
 def solve_factored(U, x, n):  # type: ignore[no-untyped-def]
-    """Overwrite x (n,) with the solution of U'U x = x, U from `factor`."""
+    """Solve with the factor U of `factor`: overwrite the right-hand side x (n,) with the solution."""
     for k in range(n):
         x[k] *= U[k, k]
         value = x[k]

@@ -1,10 +1,10 @@
-"""How functions are compiled: `kernel`, with an entry from Python, and `subroutine`, which kernels call.
+"""How functions are compiled: a `kernel` can be called from Python, a `subroutine` only from kernels.
 
-A new user waits for the compiler. Most of its time goes into numba's own Python code, and into callees, which are
-optimised again in every caller. Hence: kernels get their scratch from outside, return no arrays and count no
-references; subroutines have no compiled entry from Python, where they are plain functions; arrays are copied in loops,
-because assigning to a slice also compiles the text of its error message; all arrays are contiguous; and what a problem
-does not need is None, so that its branch is left out.
+A first run has to wait for the compiler. Most of this time goes into numba's own Python code, and into callees, which
+are optimised again in every caller. Some rules keep it short. Kernels get their scratch from outside, return no arrays
+and count no references. Subroutines have no compiled entry from Python, where they are plain functions. Arrays are
+copied in loops, because an assignment to a slice also compiles the text of its error message. All arrays are
+contiguous. What a problem does not need is None, so that the compiler leaves its branch out.
 """
 
 import gc
@@ -35,8 +35,9 @@ subroutine = register_jitable(no_cpython_wrapper=True, **_common)
 
 @contextmanager
 def first_calls() -> Iterator[None]:
-    """Keep the garbage collector off during calls that may compile: numba makes millions of objects, and searching them
-    takes a tenth of the time."""
+    """Switch the garbage collector off during calls that may compile.
+
+    Numba creates millions of objects, and searching them takes a tenth of the time."""
     collected = gc.isenabled()
     gc.disable()
     try:

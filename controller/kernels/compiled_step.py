@@ -1,4 +1,4 @@
-"""The compiled step: of every world the problem is stated, solved within bounds and certified; the wrench is turned."""
+"""The compiled step of the loop: it makes, solves and certifies the wrench problem of every world."""
 
 import numpy as np
 from pivoting.controller.belief import Belief, BelievedObject, HeldContacts, WrenchSource
@@ -25,7 +25,7 @@ STATE = 13  # numbers of a state: position (3), quaternion (4), velocity (3), an
 
 @kernel
 def state_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ignore[no-untyped-def]
-    """Write R (3, 3), J (nw, K d) and the required wrench b (nw,) at one state."""
+    """Write the problem at one state: R (3, 3), J (nw, K d) and the required wrench b (nw,)."""
     fill_rotation(q, R)
     fill_jacobian(R, belief.contacts, belief.source.map, J)
     fill_required(R, q, omega, q_d, omega_d, alpha_d, belief, b)
@@ -46,7 +46,7 @@ def belief_of(beliefs, i):  # type: ignore[no-untyped-def]
 def step_worlds(  # type: ignore[no-untyped-def]
     beliefs, bounds, own, planar, several, tolerance, states, desired, external, out, status
 ):  # fmt: skip
-    """State, solve and certify the problem of every world.
+    """Make, solve and certify the wrench problem of every world.
 
     Args:
         beliefs: of the worlds, or one that they share, see `belief.for_worlds`.
@@ -54,14 +54,14 @@ def step_worlds(  # type: ignore[no-untyped-def]
             where that needs more than `HEAVIEST` times the weight, or a second bound, the answer is that without any.
         own, planar, several: `WrenchController.workspace()`.
         tolerance: largest relative KKT residual of status 0 (solved).
-        states: (W, 13 or more) as measured; of each its orientation and its angular velocity count, see `STATE`.
-        desired: (W, 10) orientation (4), angular velocity (3) and acceleration (3) of the reference now; (1, 10) is
-            the same for all worlds.
-        external: (W, nw) or (1, nw), known wrenches on the object besides gravity, contacts and the controller's own,
-            object axes.
-        out: (W, 2 nw + K d + 1), written: required (nw), the right-hand side J f + w of the problem, `external` taken
-            off, object axes; wrench (nw), object axes, nan where the status is 2 (failed: no finite answer); force
-            (K d), contact axes; residual.
+        states: (W, 13 or more) measured states, see `STATE`, of which orientation and angular velocity are used.
+        desired: (W, 10) orientation (4), angular velocity (3) and acceleration (3) of the reference now; (1, 10) if
+            it is the same for all worlds.
+        external: (W, nw) or (1, nw), known wrenches on the object other than those of gravity, the contacts and the
+            controller, object axes.
+        out: (W, 2 nw + K d + 1), written: required (nw), the right-hand side J f + w of the problem, less
+            `external`, object axes; wrench (nw), object axes, nan where the status is 2 (failed: no finite answer);
+            force (K d), contact axes; residual.
         status: (W,) int8, written: 0 solved, 1 inaccurate, 2 failed.
     """
     each, belief = beliefs[0][0].shape[0], belief_of(beliefs, 0)
@@ -113,11 +113,11 @@ def step_worlds(  # type: ignore[no-untyped-def]
 
 @kernel
 def world_wrench(wrench_map, q, wrench, out):  # type: ignore[no-untyped-def]
-    """Turn a wrench in object axes into (force, torque) at the CoM in WORLD axes, as `xfrc_applied` wants them.
+    """Turn a wrench in object axes into force and torque at the CoM in WORLD axes, as `xfrc_applied` expects them.
 
     Args:
         wrench_map: (nw, 6), see `Space`.  q: (4,) object to world.  wrench: (nw,).
-        out: (6,), written; zero where the wrench is not finite: without an answer nothing is applied.
+        out: (6,), written; zero if the wrench is not finite, because nothing is applied without an answer.
     """
     for half in (0, 3):
         a = b = c = 0.0
@@ -132,7 +132,7 @@ def world_wrench(wrench_map, q, wrench, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def apply_wrenches(wrench_map, states, wrenches, first, out, xfrc, body):  # type: ignore[no-untyped-def]
-    """Write the wrenches of W worlds, turned as by `world_wrench`, to the log and to MuJoCo.
+    """Write the wrenches of W worlds, turned into world axes as by `world_wrench`, to the log and to MuJoCo.
 
     Args:
         states: (W, 13 or more), see `STATE`.

@@ -1,8 +1,9 @@
-"""Any number of contacts: a primal-dual interior point on the forces alone, ended by a polish.
+"""The optimum for any number of contacts, by a primal-dual interior-point method on the forces, ended by a polish.
 
 min 1/2 f'H f - h'f  s.t.  s_i = (mu f_n, f_t, f_o) in the second-order cone and f_n >= f_min, contact by contact.
 Nesterov-Todd scaling and Mehrotra's predictor and corrector (Vandenberghe, "The CVXOPT linear and quadratic cone
-program solvers", 2010), with s a function of f: every iterate is strictly feasible. A floor of 0 is no constraint.
+program solvers", 2010) are used with s as a function of f, so that every iterate is strictly feasible. A floor of 0 is
+left out as a constraint.
 """
 
 import numpy as np
@@ -26,8 +27,9 @@ EXACT = 1e-13  # relative KKT residual at which nothing is left to improve
 def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no-untyped-def]
     """Write the optimal contact forces f (n,) and wrench w (nw,), and return their relative KKT residual.
 
-    One contact in space is solved in closed form and, if that is not exact, polished. Several contacts, and what is
-    then still not exact, go to the interior point. Bounded in time; all nan where there is no finite answer.
+    One contact in space is solved in closed form and, if that is not exact, polished. The interior-point method solves
+    several contacts, and whatever is still not exact. The number of steps is bounded; the answer is nan where there is
+    no finite one.
 
     Args:
         J: (nw, n); b: (nw,) [N, N m]; Q_w: (nw, nw); Q_f: (n, n); mu (planned), f_min [N]: (K,).

@@ -1,4 +1,4 @@
-"""Which compiled kernels are still true: numba's cache knows when a function's own file changes, but not its callees'.
+"""Removes compiled kernels whose sources have changed; numba's cache notices changes of their own file only.
 
 Without this, an edit of `kkt_residual.py` would leave the loop compiled in `compiled_step.py` running the old residual.
 """
@@ -13,7 +13,7 @@ from numba import njit
 
 
 def cache_folder(room: Path) -> Path | None:
-    """The folder in which numba keeps what it compiles of the files in a room.
+    """The folder in which numba keeps what it compiles from the files of a room.
 
     It lies in NUMBA_CACHE_DIR, else beside the sources, else in the user's cache. None where none of them can be
     written to; numba then raises for each function that asks for a cache.
@@ -26,7 +26,7 @@ def cache_folder(room: Path) -> Path | None:
 
 
 def drop_stale_kernels(room: Path, *others: Path) -> None:
-    """Remove what was compiled of a room, sub-rooms included, from other sources than it and `others` have now."""
+    """Remove what was compiled of a room and its sub-rooms, if its sources or those of `others` have changed since."""
     folders = sorted({path.parent for path in room.rglob("*.py")})
     for cache in map(cache_folder, folders):
         if cache is not None:
@@ -34,9 +34,10 @@ def drop_stale_kernels(room: Path, *others: Path) -> None:
 
 
 def drop_stale(cache: Path, *rooms: Path) -> list[Path]:
-    """Remove the kernels compiled into the folder `cache` of other sources than these rooms have; returns what went.
+    """Remove the kernels in the folder `cache` that were compiled from other sources than these rooms have now.
 
-    Sources are told apart by what they say: dates of installed files need not grow from one version to the next.
+    Returns what was removed. Sources are compared by their contents, because the dates of installed files need not
+    increase from one version to the next.
     """
     digest = hashlib.sha256()
     for room in rooms:

@@ -1,6 +1,6 @@
-"""One step of the interior point: Nesterov-Todd scaling, the affine step, and the corrected one.
+"""One step of the interior-point method: Nesterov-Todd scaling, the affine step and the corrected step.
 
-See `interior_point`; the scaling point of a cone is such that W y = W^-1 s = lam.
+See `interior_point`. The scaling W of a cone is such that W y = W^-1 s = lam.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from pivoting.controller.kernels.workspace import DP, DQ, C, P, Q
 
 @subroutine
 def predict(mu, f_min, axes, work):  # type: ignore[no-untyped-def]
-    """The affine step: M = H + A'W^-2 A, factored, M x = -g. Returns how much of it could be taken."""
+    """The affine (predictor) step: factor M = H + A'W^-2 A and solve M x = -g; returns the share that can be taken."""
     H, M, x, g, n = work.H, work.M, work.x, work.g, work.x.shape[0]
     for i in range(n):
         x[i] = -g[i]
@@ -25,9 +25,9 @@ def predict(mu, f_min, axes, work):  # type: ignore[no-untyped-def]
 
 @subroutine
 def correct(mu, f_min, axes, target, second, work):  # type: ignore[no-untyped-def]
-    r"""From the predictor's steps: c = lam \ (target e - second (W^-1 ds) o (W dy)), and M x = -g + A'W^-1 c.
+    r"""The corrected step, from the affine: c = lam \ (target e - second (W^-1 ds) o (W dy)), and M x = -g + A'W^-1 c.
 
-    Returns how much of the step is taken.
+    Returns the share of the step that is taken.
     """
     dim = len(axes)
     x, g, u, lam, c, bar, floor = work.x, work.g, work.u, work.lam, work.c, work.bar, work.floor

@@ -1,8 +1,8 @@
-"""The polish: Newton on the optimality conditions once it is known which piece of its cone each contact is on.
+"""The polish: Newton's method on the optimality conditions, once it is known on which piece of its cone each force is.
 
 On its piece a contact force is a smooth function of its coordinates: (f_t, f_o, f_n) inside, (f_n, arc) on the edge
 f = f_n (mu u, 1), (f_t, f_o) on the floor, the arc on the floor's rim, nothing at the apex. In the plane u = +-1 and
-there are no arcs. Newton then converges quadratically to a point whose certificate is a few units of rounding.
+there are no arcs. Newton's method then converges quadratically to a point whose residual is a few units of rounding.
 """
 
 import numpy as np
@@ -36,10 +36,10 @@ def gradient(J, Q_w, Q_f, w, f, pull, z):  # type: ignore[no-untyped-def]
 
 @subroutine
 def polish(J, Q_w, Q_f, H, mu, f_min, axes, piece, f, w, work):  # type: ignore[no-untyped-def]
-    """Improve f (n,) and w (nw,) in place, staying on the pieces `piece` (K,) int, which a blocked step may change.
+    """Improve f (n,) and w (nw,) in place on the pieces `piece` (K,) int, which a blocked step may change.
 
-    w is carried along as w - J (change of f) and not recomputed as b - J f: where w is what is left of two large terms
-    that cancel, the gradient Q_f f - J'Q_w w would only see their rounding.
+    The wrench is updated as w - J (change of f) and not recomputed as b - J f. Where w is the small difference of two
+    large terms, the gradient Q_f f - J'Q_w w would otherwise contain only their rounding.
 
     Args:
         H: (n, n) = Q_f + J'Q_w J, see `reduce`.
@@ -184,7 +184,7 @@ def _land(mu, f_min, axes, piece, i, force):  # type: ignore[no-untyped-def]
 
 @subroutine
 def release(mu, axes, piece, f, z):  # type: ignore[no-untyped-def]
-    """Leave the pieces whose multipliers (z is the gradient, (n,)) have the wrong sign; True where there was one."""
+    """Leave the pieces whose multipliers have the wrong sign (z (n,) is the gradient); True if there was one."""
     dim = len(axes)
     changed = False
     for i in range(mu.shape[0]):

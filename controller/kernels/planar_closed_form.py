@@ -1,4 +1,4 @@
-"""The optimum in closed form: one planar contact, the compiled kernel of one world and of ten thousand.
+"""The optimum for one contact in the plane, in closed form.
 
 Eliminating w = b - J f leaves  min 1/2 f'H f - h'f  over the truncated cone {|f_t| <= mu f_n, f_n >= f_min}, with
 H = Q_f + J'Q_w J (positive definite because Q_f is) and h = J'Q_w b: strictly convex and never infeasible, since
@@ -70,8 +70,8 @@ def planar_force(H, h, mu, f_min, f):  # type: ignore[no-untyped-def]
     """Write the minimiser (f_t, f_n) of 1/2 f'H f - h'f over {|f_t| <= mu f_n, f_n >= f_min} into f (2,).
 
     The optimum lies inside, on one of the two edges, or on the floor between them (with f_min = 0 the floor is the
-    apex). Each piece has a closed form; the one that satisfies the optimality conditions best is the answer, so that
-    the choice is as exact as the certificate itself.
+    apex). Each piece has a closed form. The candidate that satisfies the optimality conditions best is the answer, so
+    that the choice is as exact as the certificate itself.
     """
     det = H[0, 0] * H[1, 1] - H[0, 1] * H[0, 1]
     t = (h[0] * H[1, 1] - h[1] * H[0, 1]) / det
@@ -106,7 +106,7 @@ def planar_force(H, h, mu, f_min, f):  # type: ignore[no-untyped-def]
 
 @subroutine
 def balancing_wrench(J, b, f, w):  # type: ignore[no-untyped-def]
-    """Write w = b - J f: with the contact forces given, only one wrench balances."""
+    """Write w = b - J f, the only wrench that balances given contact forces."""
     for i in range(J.shape[0]):
         s = b[i]
         for j in range(J.shape[1]):
@@ -116,7 +116,7 @@ def balancing_wrench(J, b, f, w):  # type: ignore[no-untyped-def]
 
 @kernel
 def planar_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no-untyped-def]
-    """As `contact_wrench`, for one contact in the plane.  scratch: the values of a `Reduced`."""
+    """Solve one contact in the plane, like `contact_wrench`; scratch contains the values of a `Reduced`."""
     work = Reduced(*scratch)
     reduce(J, b, Q_w, Q_f, work.H, work.h, work.x)
     planar_force(work.H, work.h, mu[0], f_min[0], f)

@@ -1,4 +1,4 @@
-"""The wrench that a law requires: what contact forces and applied wrench have to make together, compiled."""
+"""The wrench that a control law requires: contact forces and applied wrench have to make it together."""
 
 from pivoting.controller.kernels.compilation import subroutine
 from pivoting.controller.plane_and_space import component
@@ -7,7 +7,7 @@ from pivoting.controller.rotations import cross, into, rotation_error
 
 @subroutine
 def fill_required(R, q, omega, q_d, omega_d, alpha_d, belief, out):  # type: ignore[no-untyped-def]
-    """Write the required wrench (nw,) in object axes: what contact and applied wrench must make together.
+    """Write the required wrench (nw,), object axes, which contacts and applied wrench must make together.
 
     Args:
         R, q: (3, 3), (4,) orientation, object to world; omega: (3,) angular velocity, world axes [rad/s].

@@ -1,9 +1,9 @@
-"""One contact in space in closed form, up to one scalar root of a concave function.
+"""The optimum for one contact in space, in closed form up to one scalar root of a concave function.
 
 min 1/2 f'H f - h'f over {|(f_t, f_o)| <= mu f_n, f_n >= f_min}. With H = L L' and D = diag(1, 1, -mu^2), the
 eigenvectors V of L^-1 D L^-T turn it (y = V'L'f) into the projection of a point onto an elliptic cone
 {k_1 y_1^2 + k_2 y_2^2 <= y_3^2, y_3 >= 0}, whose only unknown is t = y_3 > 0. The equations (H + lambda D) f = h are
-these, but in lambda they have a pole and a hard case at h_3 = 0, and in t neither.
+equivalent, but in lambda they have a pole, and a hard case at h_3 = 0; in t they have neither.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ SWEEPS, ROOTS = 12, 40  # bounds of the two iterations, which need about 4 each
 def spatial_force(H, h, mu, f_min, f):  # type: ignore[no-untyped-def]
     """Write the minimiser (f_t, f_o, f_n) into f (3,) and return its piece.
 
-    Accurate to about eps cond(H), which `polish` brings down to rounding.
+    The result is accurate to about eps cond(H); `polish` improves it to rounding.
     """
     h0, h1, h2 = h[0], h[1], h[2]
     l00 = np.sqrt(H[0, 0])

@@ -1,4 +1,4 @@
-"""Scratch of the compiled solvers, made once for a problem size: they allocate nothing."""
+"""The scratch arrays of the compiled solvers, which are made once for a problem size: the solvers allocate nothing."""
 
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ P, Q, DP, DQ, C = 0, 1, 2, 3, 4  # columns of `Work.floor`
 class Reduced(NamedTuple):
     """Scratch for one contact in the plane, n = 2.
 
-    H: (n, n) and h: (n,) of the problem in f alone.  x: (n,).  pull: (2, nw), Q_w w and |Q_w||w|.
+    H: (n, n) and h: (n,) of the problem in f alone.  x: (n,).  pull: (2, nw) for Q_w w and |Q_w||w|.
     """
 
     H: Array
@@ -50,11 +50,11 @@ class Work(NamedTuple):
 
 
 def workspace(nw: int, K: int, dim: int) -> tuple[tuple[Any, ...] | None, tuple[Any, ...] | None]:
-    """Scratch for `planar_wrench`, the values of a `Reduced`, or else for `contact_wrench`: what `opened` opens.
+    """The scratch for one problem size: for `planar_wrench` the values of a `Reduced`, else that of `contact_wrench`.
 
-    One contact in the plane needs no more than the reduced problem. None tells the compiler which of the two to leave
-    out, and that is most of its work. Few arrays in plain tuples, because handing over each
-    costs 0.07 us, and in a named one 0.16.
+    The latter is unpacked by `opened`. One contact in the plane needs only the reduced problem. The one that is not
+    needed is None, which tells the compiler to leave it out, and this saves most of its work. The arrays are few and
+    in plain tuples, because passing each of them costs 0.07 us, and 0.16 us in a named tuple.
     """
     n = K * dim
     if n == 2:

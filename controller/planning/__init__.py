@@ -1,1 +1,1 @@
-"""Planning over a horizon: the program, its solution by sequential convex programming, and the receding horizon."""
+"""Planning over a horizon: its program, the solution by sequential convex programming, and the receding horizon."""

@@ -1,15 +1,17 @@
-"""The horizon's equations of motion, linearised about a path: blocks for each step, in the plane and in space alike.
+"""The equations of motion of a horizon, linearised about a path, in the plane and in space.
 
-With y_t the difference of pose t from pose t - 1 (translation in table axes, rotation vector in object axes), all of
+Let y_t be the change from pose t - 1 to pose t (translation in table axes, rotation vector in object axes). The
+equations of the four integrators,
 
     quasi-dynamic  M y_t / h^2 = F(q_t, u_t)                      the notes: every step starts from rest
     implicit       M (y_t - y_{t-1}) / h^2 = F(q_t, u_t)          the same with the velocity term
     semi-implicit  M (y_t - y_{t-1}) / h^2 = F(q_{t-1}, u_t)      MuJoCo's Euler
     forward        M (y_t - y_{t-1}) / h^2 = F(q_{t-2}, u_t)      its first pose is given by the initial velocity
 
-with u = (w, f), F = (R w_F + C f + m g, w_M + p x R'C f - c omega x I omega), are one equation: `order` counts the
-differences on the left, `lag` the poses between the one that is reached and the one at which forces act. Velocities
-are y / h, so that they are no variables; omega is that of y_{t-1}, and c = 0 for order 1.
+with u = (w, f) and F = (R w_F + C f + m g, w_M + p x R'C f - c omega x I omega), are one equation with two numbers:
+`order` is the order of the difference on the left, and `lag` the number of poses from the one at which the forces act
+to the one that is reached. Velocities are y / h, so they need no variables; omega is that of y_{t-1}, and c = 0 for
+order 1.
 """
 
 from typing import NamedTuple, Self
@@ -33,10 +35,10 @@ from pivoting.controller.validate import Array
 
 
 class Path(NamedTuple):
-    """Poses 0 to N, in table axes, and what came before them.
+    """The poses 0 to N of a motion, in table axes, and the motion before them.
 
     position: (N+1, 3) CoM [m].  orientation: (N+1, 4) object axes to table.
-    before: (7,) the pose at which a forward step's forces act first, position and orientation.
+    before: (7,) the pose, position and orientation, at which the forces of the first "forward" step act.
     arriving: (6,) y_0, h times the velocity with which pose 0 is reached.
     """
 
@@ -47,10 +49,10 @@ class Path(NamedTuple):
 
 
 class Mechanics(NamedTuple):
-    """What the compiled rows need to know; see `Belief`, but in table axes.
+    """What the compiled equations need to know about the object; as in `Belief`, but in table axes.
 
     frames: (K, 3, d) contact axes as columns.  gravity: (3,).  pick, sign: (nw,) the components of 6 that are used.
-    units: in which rows and columns are written.
+    units: of the rows and columns.
     """
 
     mass: float
@@ -65,9 +67,11 @@ class Mechanics(NamedTuple):
 
 
 class MotionRows(NamedTuple):
-    """towards[0] d_t + towards[1] d_{t-1} + towards[2] d_{t-2} + by_wrench w_t + by_force f_t + constant = 0.
+    """The linearised equations of motion, as the coefficients of
 
-    d: corrections of the poses, (nq,) each; zero for the given pose 0. All in `Units`.
+        towards[0] d_t + towards[1] d_{t-1} + towards[2] d_{t-2} + by_wrench w_t + by_force f_t + constant = 0
+
+    for every step t. The correction d_t (nq,) of pose t is zero for the given pose 0. Everything is in `Units`.
     constant: (N, nq).  towards: (3, N, nq, nq).  by_wrench: (N, nq, nw).  by_force: (N, nq, K d).
     """
 
@@ -78,7 +82,7 @@ class MotionRows(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Scratch for `fill_rows`, `fill_tracking` and `fill_corrected`.
+    """The scratch arrays of `fill_rows`, `fill_tracking` and `fill_corrected`.
 
     turns: (8, 3, 3).  poses: (5, 6).  blocks: (4, 6, 6).
     """
@@ -89,16 +93,17 @@ class Scratch(NamedTuple):
 
     @classmethod
     def empty(cls) -> Self:
-        """A new one, not initialised."""
+        """New scratch arrays, not initialised."""
         return cls(np.empty((8, 3, 3)), np.empty((5, 6)), np.empty((4, 6, 6)))
 
 
 @kernel
 def fill_start(table, to_table, kept, h, ahead, position, orientation, velocity, omega, R, out):  # type: ignore[no-untyped-def]
-    """Write pose 0 of a `Path`, from a state in world axes; `ahead`: one step after it, see `INTEGRATORS`.
+    """Write pose 0 of a `Path` from a state in world axes; with `ahead` it is one step later, see `INTEGRATORS`.
 
     Args:
-        table: (3, 3) its axes as columns; to_table: (4,) its inverse.  kept: (6,) 0 for what cannot move, else 1.
+        table: (3, 3) the table's axes as columns; to_table: (4,) the inverse.
+        kept: (6,) 0 for what cannot move, else 1.
         R: (3, 3) scratch.
     """
     fill_rotation(orientation, R)
@@ -198,12 +203,12 @@ def _fill_forces(body, wrench, force, scratch, X, by_force):  # type: ignore[no-
 
 @subroutine
 def fill_motion(body, order, lag, h, path, wrench, force, scratch, out):  # type: ignore[no-untyped-def]
-    """Write the equations of motion, to first order in poses and exactly in wrench and force, about a path.
+    """Write the equations of motion about a path: to first order in the poses, exactly in wrenches and forces.
 
     Args:
         body: `Mechanics`.  order, lag: of the integrator.  h: [s].  path: `Path`.
-        wrench, force: (N, nw), (N, K d) [N, N m], with which the forces' dependence on the pose is linearised; zero:
-            it is not.
+        wrench, force: (N, nw), (N, K d) [N, N m], about which the dependence of the forces on the pose is linearised;
+            with zeros it is neglected.
         scratch: `Scratch`.  out: `MotionRows`.
     """
     nw, units, R = body.pick.shape[0], body.units, scratch.turns[0]

@@ -1,10 +1,11 @@
-"""The N-step program of the notes: wrenches, contact forces and poses over a horizon, stated as a convex program.
+"""The horizon: the notes' program for the wrenches, contact forces and poses of N steps.
 
     min  sum_t  1/2 w_t'Q_w w_t + 1/2 f_t'Q_f f_t + 1/2 e_t'Q e_t,    e_t from pose t to the desired pose t
-    s.t. motion (see `transcription`), friction cones, bounds on the wrench, and, if asked, contacts that do not move
+    s.t. motion (see `equations_of_motion`), friction cones, bounds on the wrench, and, with `stick`, contacts at rest
 
-The contact Jacobian multiplies forces by poses, so that the program is bilinear: it is stated about a path, in
-corrections of its poses, and `plan` repeats that about its own answer until nothing changes.
+The contact Jacobian, which depends on the poses, multiplies forces, so the program is bilinear. It is therefore
+linearised about a path, with corrections of the poses as unknowns, and `Planner.plan` repeats this about its own answer
+until the answer no longer changes.
 """
 
 from dataclasses import dataclass
@@ -26,7 +27,11 @@ OFF_PLANE = np.deg2rad(1.0)  # by which a measured state may be out of the plane
 
 
 class BodyState(NamedTuple):
-    """CoM (3,) [m] and orientation (4,), object axes to world; their velocities (3,) in world axes [m/s, rad/s]."""
+    """The state of an object: its pose and its velocity.
+
+    The pose is the CoM (3,) [m] and the orientation (4,), object axes to world; the velocities (3,) of both are in
+    world axes [m/s, rad/s].
+    """
 
     position: Array
     orientation: Array
@@ -36,20 +41,22 @@ class BodyState(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Horizon:
-    """What is planned, over how many steps and how.
+    """A planning problem: the object and its contacts, the number of steps, the weights and the bounds.
 
     Attributes:
-        controller: the belief about object, contacts, friction (its margin included), gravity and weights Q_w, Q_f.
+        controller: what it believes about object, contacts, friction (with its margin) and gravity counts, and its
+            weights Q_w, Q_f.
         steps: N.  h: length of a step [s].
-        integrator: "quasi-dynamic" (the notes'), "implicit", "semi-implicit" or "forward"; see `transcription`.
-        Q: (N, nq, nq) weights on pose errors, (x, z, theta) in the plane, (translation in table axes, rotation
-            vector in object axes) in space. One (nq, nq) serves every step; the notes' identity by default.
+        integrator: "quasi-dynamic" (as in the notes), "implicit", "semi-implicit" or "forward"; see
+            `equations_of_motion`.
+        Q: (N, nq, nq) weights on pose errors: (x, z, theta) in the plane, (translation in table axes, rotation
+            vector in object axes) in space. One (nq, nq) applies to every step. The default is the notes' identity.
         bounds: on the wrench.
-        stick: the contact points stay where they are; otherwise the desired arc merely suggests it.
-        clear: (P, 3) points of the object, from the CoM in object axes, that stay on or above the table; with none
-            of them a plan may turn the object into the table.
-        edges: of the inscribed polygon that stands for |force| in the plane; 0: the disc itself, which only
-            "clarabel" takes.
+        stick: whether the contact points have to stay where they are; otherwise the desired arc merely suggests it.
+        clear: (P, 3) points of the object, from the CoM in object axes, that have to stay on or above the table;
+            without any, a plan may turn the object into the table.
+        edges: number of edges of the inscribed polygon that replaces the disc of a bound on |force| in the plane; 0
+            for the disc itself, which only "clarabel" accepts.
     """
 
     controller: WrenchController
@@ -104,12 +111,12 @@ class Horizon:
 
     @cached_property
     def table(self) -> Array:
-        """(3, 3) the table's axes as columns, world axes."""
+        """The table's axes as columns (3, 3), world axes."""
         return rotation_matrix(self.controller.base)
 
     @property
     def times(self) -> Array:
-        """(N,) after how long poses 1 to N are reached [s]; pose 0 is now, but for "forward" one step ahead."""
+        """The times (N,) at which poses 1 to N are reached [s]; pose 0 is now or, for "forward", one step ahead."""
         first = 2 if INTEGRATORS[self.integrator][1] == 2 else 1
         return self.h * np.arange(first, first + self.steps, dtype=float)
 
@@ -140,10 +147,10 @@ class Horizon:
             raise fail(name, shown, "in the controller's plane, which its base gives")
 
     def in_plane(self, state: BodyState) -> BodyState:
-        """A state that is measured: in the plane turned into it, as the per-step law sees it; else as it is.
+        """A measured state; if the problem is planar, turned into the plane, as the per-step law sees it.
 
         Raises:
-            ValueError: it is more than `OFF_PLANE` out of the plane.
+            ValueError: the state is more than `OFF_PLANE` out of the plane.
         """
         space = self.controller.space
         if space.dim == 3:
@@ -162,7 +169,7 @@ class Horizon:
         return float((others - contacts.min()).min(initial=np.inf)) / self.controller.units.length
 
     def arc(self, orientations: ArrayLike, state: BodyState) -> tuple[Array, Array]:
-        """Desired poses, in world axes, that turn about the contacts where they are now: (N, 3) CoMs, (N, 4).
+        """Desired poses that turn about the contacts where they are now: CoMs (N, 3), orientations (N, 4), world axes.
 
         Args:
             orientations: (N, 4) quaternions object to world, at `times`.

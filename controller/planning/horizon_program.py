@@ -1,7 +1,7 @@
-"""The horizon stated as a convex program about a guess: its rows, its cost, and what an answer to it means.
+"""The convex program of a horizon, linearised about a guess, and how its answer corrects the guess.
 
-All in `Units`. Step t has the columns (correction of pose t, wrench t, contact forces t), and rows of motion and
-sticking (equalities), half-lines, and second-order cones.
+Everything is in `Units`. Step t has the columns (correction of pose t, wrench t, contact forces t), and the rows of
+motion and sticking (equalities), half-lines, and second-order cones.
 """
 
 from typing import NamedTuple
@@ -27,7 +27,7 @@ from pivoting.controller.validate import Array
 
 
 class Guess(NamedTuple):
-    """About what a program is stated: poses in table axes, wrenches (N, nw) and contact forces (N, K d) [N, N m]."""
+    """What a program is linearised about: poses in table axes, wrenches (N, nw), contact forces (N, K d) [N, N m]."""
 
     path: Path
     wrench: Array
@@ -35,7 +35,7 @@ class Guess(NamedTuple):
 
 
 class HorizonProgram:
-    """States the programs of one horizon; all in it is constant."""
+    """Makes the convex programs of one horizon."""
 
     def __init__(self, horizon: Horizon):
         belief, space, N = horizon.controller.belief, horizon.controller.space, horizon.steps
@@ -96,12 +96,13 @@ class HorizonProgram:
         )
 
     def stated(self, desired: tuple[Array, Array], guess: Guess, applied: Array | None = None) -> ConicProgram:
-        """The program about a guess.
+        """The convex program about a guess.
 
         Args:
             desired: of `Horizon.desired`.
             guess: its path begins where the object is, see `Horizon.start`.
-            applied: (nw,) wrench until now, for bounds on its rate; None: not known, and the first one is free of them.
+            applied: (nw,) the wrench applied until now, for bounds on its rate; None if it is not known, and then the
+                first wrench has no such bounds.
         """
         N, nq = self.horizon.steps, len(self._units.pose)
         rows = self._rows(guess)
@@ -118,9 +119,9 @@ class HorizonProgram:
         return ConicProgram(self._P.filled((curvature,)), q.ravel(), A, b, self.cones)
 
     def corrected(self, guess: Guess, x: Array) -> tuple[Guess, float]:
-        """The guess with an answer's corrections and its wrenches and forces, and the greatest change of any of them.
+        """The guess as an answer corrects it, with the answer's wrenches and forces, and the greatest change of all.
 
-        The change is in units of the weight and the lever, and of radians.
+        The change is in weights, levers and radians.
         """
         N, path = self.horizon.steps, guess.path
         poses = path._replace(position=np.empty(path.position.shape), orientation=np.empty(path.orientation.shape))
@@ -128,7 +129,7 @@ class HorizonProgram:
         return out, fill_corrected(self._body, x.reshape(N, self._wide), guess, Scratch.empty(), out)
 
     def defects(self, guess: Guess) -> tuple[float, float]:
-        """How far a guess is from its own equations, not linearised: motion in weights, sticking in levers, radians."""
+        """How far a guess is from the nonlinear equations: motion in weights, sticking in levers, radians."""
         return defects(self._rows(guess), self._units, guess.wrench, guess.force)
 
     def objective(self, desired: tuple[Array, Array], guess: Guess) -> float:

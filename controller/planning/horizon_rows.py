@@ -1,4 +1,4 @@
-"""What of a horizon's program depends on a guess: its rows, the cost of tracking, and how far the guess is off."""
+"""The parts of a horizon's program that depend on the guess: its rows, the cost of tracking, and the defects."""
 
 from typing import NamedTuple, Self
 
@@ -10,9 +10,9 @@ from pivoting.controller.validate import Array
 
 
 class Rows(NamedTuple):
-    """Of N steps; see `fill_motion`, `fill_sticking` and `fill_clearance`.
+    """The rows of N steps; see `fill_motion`, `fill_sticking` and `fill_clearance`.
 
-    sticking: (N, S, nq), off: (N, S).  clearance: (N, P, nq), room: (N, P).
+    sticking: (N, S, nq), with the sides off: (N, S).  clearance: (N, P, nq), with the sides room: (N, P).
     """
 
     motion: MotionRows
@@ -23,14 +23,14 @@ class Rows(NamedTuple):
 
     @classmethod
     def empty(cls, N: int, nq: int, n: int, S: int, P: int) -> Self:
-        """Room for them."""
+        """Arrays for the rows, not initialised."""
         motion = MotionRows(np.empty((N, nq)), np.empty((3, N, nq, nq)), np.empty((N, nq, nq)), np.empty((N, nq, n)))
         return cls(motion, np.empty((N, S, nq)), np.empty((N, S)), np.empty((N, P, nq)), np.empty((N, P)))
 
 
 @kernel
 def fill_rows(body, order, lag, h, fixed, planar, clear, path, wrench, force, scratch, rows):  # type: ignore[no-untyped-def]
-    """Write all of them about a path, wrenches (N, nw) and forces (N, K d) [N, N m]; those without a row are left."""
+    """Write all rows about a path, wrenches (N, nw) and forces (N, K d) [N, N m]."""
     fill_motion(body, order, lag, h, path, wrench, force, scratch, rows.motion)
     if rows.off.shape[1]:
         fill_sticking(body, fixed, planar, path, scratch, rows.sticking, rows.off)
@@ -40,11 +40,11 @@ def fill_rows(body, order, lag, h, fixed, planar, clear, path, wrench, force, sc
 
 @kernel
 def fill_sides(rows, equal, linear, out):  # type: ignore[no-untyped-def]
-    """Write the right-hand sides of rows that depend on a guess among those of a program.
+    """Write those right-hand sides of a program that depend on the guess.
 
     Args:
-        equal, linear: how many equalities and half-lines a step has: motion, sticking; others, clearance.
-        out: of all equalities, then of all half-lines, then others.
+        equal, linear: numbers of equalities (motion, sticking) and of half-lines (others, clearance) of a step.
+        out: the sides of all equalities, then of all half-lines, then others.
     """
     N, nq = rows.motion.constant.shape
     for t in range(N):
@@ -59,7 +59,7 @@ def fill_sides(rows, equal, linear, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def defects(rows, units, wrench, force):  # type: ignore[no-untyped-def]
-    """How far wrenches (N, nw) and forces (N, K d) are from the motion, in units, and a path from sticking."""
+    """How far wrenches (N, nw) and forces (N, K d) are from making the motion, and a path from sticking, in units."""
     moved, off = 0.0, 0.0
     motion = rows.motion
     for t in range(wrench.shape[0]):
@@ -79,7 +79,7 @@ def defects(rows, units, wrench, force):  # type: ignore[no-untyped-def]
 
 @kernel
 def fill_corrected(body, x, guess, scratch, out):  # type: ignore[no-untyped-def]
-    """Write the guess that an answer x (N, 2 nq + K d) makes of a guess, and return the greatest change, in units."""
+    """Write the guess as an answer x (N, 2 nq + K d) corrects it, and return the greatest change, in units."""
     nq, n, units, change = guess.wrench.shape[1], guess.force.shape[1], body.units, 0.0
     moved = scratch.poses[0]
     for i in range(3):
@@ -104,12 +104,12 @@ def fill_corrected(body, x, guess, scratch, out):  # type: ignore[no-untyped-def
 
 @subroutine
 def fill_sticking(body, fixed, planar, path, scratch, rows, side):  # type: ignore[no-untyped-def]
-    """Write rows (N, S, nq) and sides (N, S): rows d_t = side keeps the contacts where they were at the start.
+    """Write the sticking rows (N, S, nq) and sides (N, S): rows d_t = side keeps the contacts where they started.
 
     Args:
         body: `Mechanics`.
-        fixed: (D, 2, 3) pairs (u, e) of object axes: e, where it pointed at the start, does not turn towards u.
-        planar: whether the motion is in the plane, and so the middle row of three for the contacts' mean is left out.
+        fixed: (D, 2, 3) pairs (u, e) of object axes: e must not turn towards u from where it pointed at the start.
+        planar: whether the motion is planar; then the middle one of the three rows for the contacts' mean is left out.
     """
     R, R_0 = scratch.turns[0], scratch.turns[1]
     fill_rotation(path.before[3:], R_0)
@@ -148,10 +148,12 @@ def fill_sticking(body, fixed, planar, path, scratch, rows, side):  # type: igno
 
 @subroutine
 def fill_clearance(body, clear, path, scratch, rows, side):  # type: ignore[no-untyped-def]
-    """Write rows (N, P, nq) and sides (N, P): rows d_t <= side keeps points above the lowest contact of the start.
+    """Write the clearance rows (N, P, nq) and sides (N, P): rows d_t <= side keeps points above the table.
 
     Args:
-        body: `Mechanics`.  clear: (P, 3) from the CoM, object axes [m].
+        body: `Mechanics`.
+        clear: (P, 3) the points, from the CoM, object axes [m]. The table is taken to be as high as the lowest contact
+            at the start.
     """
     length, pose = body.units.length, body.units.pose
     R, full = scratch.turns[0], scratch.poses[0]
@@ -175,15 +177,15 @@ def fill_clearance(body, clear, path, scratch, rows, side):  # type: ignore[no-u
 
 @kernel
 def fill_tracking(body, Q, path, position, orientation, scratch, curvature, slope):  # type: ignore[no-untyped-def]
-    """Write what 1/2 e'Q e is to second order in d_t, e the errors from a path's poses to desired ones.
+    """Write the cost of tracking, 1/2 e'Q e, to second order in d_t; e leads from a path's poses to desired ones.
 
     Args:
-        body: `Mechanics`.  Q: (N, nq, nq), over the square of the unit of force.
+        body: `Mechanics`.  Q: (N, nq, nq), divided by the square of the unit of force.
         position: (N, 3), orientation: (N, 4): desired, table axes.
         curvature: (N, nq, nq) and slope: (N, nq or more), out.
 
     Returns:
-        The sum of 1/2 e'Q e, over that square.
+        The sum of 1/2 e'Q e, divided by that square.
     """
     cost, nw = 0.0, body.pick.shape[0]
     full, error = scratch.poses[0], scratch.poses[1]

@@ -1,4 +1,4 @@
-"""Receding horizon: plan again and again from where the object is, and what to follow between two plans."""
+"""The receding horizon: plans made again and again from where the object is, and the motion between two of them."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -17,13 +17,13 @@ LANDED = 1e-3  # of the lever: a watched point this close to the table has come 
 
 
 class Followed(NamedTuple):
-    """What is followed until the next plan.
+    """The plan that is followed until the next one is made.
 
     Attributes:
-        plan: the last that succeeded, or None.
+        plan: the last plan that succeeded, or None.
         since: time since it was made [s].
-        outcome: of `OUTCOMES`.
-        attempt: the plan that was tried last, whatever came of it.
+        outcome: one of `OUTCOMES`.
+        attempt: the plan that was tried last, successful or not.
     """
 
     plan: Plan | None
@@ -34,16 +34,17 @@ class Followed(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RecedingHorizon:
-    """Plans every `period` seconds; all that is remembered is what `replan` returns and is given back.
+    """A planner that makes a new plan every `period` seconds, from where the object is.
 
-    A plan that fails is replaced by the last one, shifted by the time that has passed; when that has run out, the
-    object is to stay as it is ("holding"): the per-step law then holds it or, where the bounds do not allow that,
-    lowers it as gently as they do. Once it has come down on another of its points, it is let go for good ("released").
+    It has no memory: what `replan` returns is passed to it again at the next call. If a plan fails, the last one that
+    succeeded takes its place, shifted by the time that has passed. When that plan has come to its end, the object is to
+    stay as it is ("holding"): the per-step law then holds it or, where the bounds do not allow that, lowers it as
+    gently as they allow. Once it has come down on another of its points, it is let go for good ("released").
 
     Attributes:
         planner: of the horizon.  period: [s].
-        passes: programs solved for each plan. They are stated about the desired poses, with the last plan's wrenches
-            and forces, shifted by whole steps; three times as many where there is no such plan.
+        passes: number of programs solved for each plan. They are linearised about the desired poses and the last plan's
+            wrenches and forces, shifted by whole steps; without such a plan three times as many are solved.
     """
 
     planner: Planner
@@ -61,10 +62,10 @@ class RecedingHorizon:
 
         Args:
             last: what was followed until now; None at first.
-            applied: (nw,) wrench until now, for bounds on its rate.
+            applied: (nw,) the wrench applied until now, for bounds on its rate.
 
         Raises:
-            ValueError: in the plane, a state that is more than a degree out of it.
+            ValueError: the problem is planar, and the state is more than a degree out of the plane.
         """
         if last is not None and last.outcome == "released":
             return last
@@ -93,13 +94,15 @@ def _shifted(plan: Plan, steps: float) -> tuple[Array, Array]:
 
 
 def followed_motion(followed: Followed, state: BodyState, times: Array) -> tuple[Array, Array, Array]:
-    """What to follow at `times` (T,) [s] after the last call of `replan`: (T, 4), (T, 3), (T, 3), world axes.
+    """The motion to follow at `times` (T,) [s] after the last call of `replan`, world axes.
 
-    A plan's accelerations are constant over its steps, and integrated exactly here; its own poses are those of its
-    integrator. A quasi-dynamic plan has velocities and no accelerations. Holding means to stay where the object is.
+    It consists of orientations (T, 4), angular velocities (T, 3) and accelerations (T, 3). The accelerations of a plan
+    are constant over its steps and are integrated exactly here; the poses of the plan itself are those of its
+    integrator. A quasi-dynamic plan has velocities and no accelerations. "Holding" means that the object stays where it
+    is.
 
     Args:
-        state: that the last call of `replan` was given.
+        state: the one with which `replan` was called last.
     """
     plan = followed.plan
     if plan is None:

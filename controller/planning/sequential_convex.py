@@ -1,4 +1,4 @@
-"""Planning: the horizon's program solved, stated again about its own answer until that changes no more, and judged."""
+"""Sequential convex programming: a horizon's program is solved and linearised again about its answer, repeatedly."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -21,19 +21,19 @@ STATUS = ("solved", "not converged", "infeasible", "failed")
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """An answer to a horizon's program, with how well it satisfies its own equations.
+    """A planned motion over a horizon, and how well it satisfies its own equations.
 
     Attributes:
         program: of the horizon.  desired: poses (N, 3) and (N, 4), table axes.
-        guess: the answer, poses in table axes, as the next program can be stated about it.
-        status: "solved", "not converged" (the last pass still changed more than asked), "infeasible" or "failed".
-        said: by the solver.
-        passes: how many programs were solved.
+        guess: the planned poses (table axes), wrenches and forces; the next program can be linearised about them.
+        status: "solved", "not converged" (the last pass changed more than is tolerated), "infeasible" or "failed".
+        said: what the solver reported.
+        passes: number of programs that were solved.
         changes: by how much each of them changed the guess, in weights, levers, radians.
         residual: relative KKT residual of the last program.
-        motion_defect: of the equations of motion themselves, not linearised, over the weight.
-        stick_defect: of the contacts staying put, over the lever; 0 if that was not asked.
-        seconds: in all.  solver_seconds: inside the solver.
+        motion_defect: how far the plan is from the nonlinear equations of motion, over the weight.
+        stick_defect: how far the contacts move, over the lever; 0 if they need not stick.
+        seconds: time in all.  solver_seconds: time inside the solver.
     """
 
     program: HorizonProgram = field(repr=False)
@@ -51,34 +51,34 @@ class Plan:
 
     @property
     def horizon(self) -> Horizon:
-        """What was planned."""
+        """The horizon that was planned."""
         return self.program.horizon
 
     @cached_property
     def objective(self) -> float:
-        """Of the answer, in SI units."""
+        """The objective of the answer, in SI units."""
         return self.program.objective(self.desired, self.guess)
 
     @cached_property
     def position(self) -> Array:
-        """(N+1, 3) CoM [m], world axes."""
+        """The CoM (N+1, 3) at each pose [m], world axes."""
         return _frozen(self.guess.path.position @ self.horizon.table.T)
 
     @cached_property
     def orientation(self) -> Array:
-        """(N+1, 4) object axes to world."""
+        """The orientation (N+1, 4) at each pose, object axes to world."""
         return _frozen(quaternion_product(self.horizon.controller.base, self.guess.path.orientation))
 
     @cached_property
     def velocity(self) -> Array:
-        """(N+1, 3) of the CoM, with which each pose is reached, world axes [m/s]."""
+        """The velocity (N+1, 3) of the CoM with which each pose is reached, world axes [m/s]."""
         path = self.guess.path
         moved = np.concatenate([path.arriving[None, :3], np.diff(path.position, axis=0)])
         return _frozen(moved @ self.horizon.table.T / self.horizon.h)
 
     @cached_property
     def angular_velocity(self) -> Array:
-        """(N+1, 3) with which each pose is reached, world axes [rad/s]."""
+        """The angular velocity (N+1, 3) with which each pose is reached, world axes [rad/s]."""
         path = self.guess.path
         turned = np.empty((len(path.position), 3))
         turned[0] = path.arriving[3:]
@@ -87,12 +87,12 @@ class Plan:
 
     @property
     def wrench(self) -> Array:
-        """(N, nw) object axes [N, N m]; that of step t leads to pose t + 1."""
+        """The wrenches (N, nw), object axes [N, N m]; that of step t leads to pose t + 1."""
         return self.guess.wrench
 
     @property
     def force(self) -> Array:
-        """(N, K, d) contact axes [N]."""
+        """The contact forces (N, K, d), contact axes [N]."""
         return self.guess.force.reshape(self.horizon.steps, -1, self.horizon.controller.space.dim)
 
 
@@ -102,11 +102,12 @@ def _frozen(values: Array) -> Array:
 
 
 class Planner:
-    """Plans for one horizon, with a solver whose structure is kept from plan to plan.
+    """Makes plans for one horizon, with a solver that is set up once.
 
     Args:
-        horizon: what to plan.
-        method: "clarabel", or in the plane "qp:<backend>" of qpsolvers; None: "qp:piqp" in the plane, else "clarabel".
+        horizon: the planning problem.
+        method: "clarabel" or, in the plane, "qp:<backend>" of qpsolvers. The default is "qp:piqp" in the plane, and
+            "clarabel" in space.
         options: of the solver.
     """
 
@@ -122,9 +123,10 @@ class Planner:
         self._solve = _solver(self.method, options)
 
     def guess(self, state: BodyState, desired: tuple[Array, Array] | None = None) -> Guess:
-        """About desired poses (N, 3), (N, 4) in world axes, with no forces: J_c of the reference.
+        """A first guess: desired poses (N, 3), (N, 4), world axes, without forces.
 
-        None: about where the object is, which is further from the answer, but always keeps contacts where they are.
+        Without desired poses it is the present pose of the object, which is farther from the answer, but always keeps
+        the contacts where they are.
         """
         start = self.horizon.start(state)
         return self._about(start, _still(start) if desired is None else self.horizon.desired(*desired))
@@ -178,16 +180,17 @@ class Planner:
         passes: int = 50,
         tolerance: float = CONVERGED,
     ) -> Plan:
-        """Plan from `state` towards poses (N, 3), (N, 4) in world axes, at the times `Horizon.times`.
+        """Plan from `state` towards poses (N, 3), (N, 4), world axes, at the times `Horizon.times`.
 
-        Look at the plan's status: one that is "infeasible" or "failed" is no plan, and holds what it was stated about.
+        Check the status of the plan: one that is "infeasible" or "failed" is no plan, and contains only the guess.
 
         Args:
-            guess: about which the first program is stated; it begins at `state` whatever it began at before. None: the
-                desired poses, and if there is no answer about those, which may be far away, where the object is.
-            forces: (N, nw), (N, K d), in place of a guess: about the desired poses alone, with these wrenches.
+            guess: what the first program is linearised about; it is made to begin at `state`. The default is the
+                desired poses or, if these are too far away for an answer, the present pose of the object.
+            forces: wrenches (N, nw) and forces (N, K d) in place of a guess: the first program is linearised about the
+                desired poses with these, and about nothing else.
             applied: see `HorizonProgram.stated`.
-            passes: at most so many programs; with 1 the answer is that of the program about the guess.
+            passes: greatest number of programs; with 1 the answer is that of the program about the guess.
         """
         number("tolerance", tolerance, above=0.0)
         if isinstance(passes, bool) or not isinstance(passes, int | np.integer) or passes < 1:

@@ -1,1 +1,1 @@
-"""The solvers: wrench problems and horizons as conic programs; the calls of Clarabel, qpsolvers and the closed form."""
+"""The solvers: conic programs of wrench problems, and the calls of Clarabel, qpsolvers and the closed forms."""

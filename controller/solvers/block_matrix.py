@@ -1,4 +1,4 @@
-"""Sparse matrices of one pattern, filled block by block: what changes from step to step are numbers alone."""
+"""Sparse matrices with a fixed pattern, filled block by block: only their numbers change from step to step."""
 
 from typing import Any, NamedTuple
 
@@ -12,9 +12,9 @@ Indices = NDArray[np.int64]
 
 
 class Part(NamedTuple):
-    """S equal blocks: rows (S, r) and columns (S, c) of each, and the mask (r, c) of what may be other than zero.
+    """S blocks of one shape, at rows (S, r) and columns (S, c); the mask (r, c) marks entries that may be nonzero.
 
-    still: (r, c) the same numbers in all blocks and for good; None: they change.
+    still: (r, c) numbers that are the same in all blocks and never change; None if the numbers change.
     """
 
     rows: Indices
@@ -24,7 +24,7 @@ class Part(NamedTuple):
 
 
 class Sparse(NamedTuple):
-    """A matrix (rows, columns) in compressed columns; half the cost of SciPy's, which checks it anew each time."""
+    """A matrix in compressed columns; it costs half as much as SciPy's, which checks its arrays each time."""
 
     data: Array
     indices: NDArray[np.int32]
@@ -36,14 +36,14 @@ class Sparse(NamedTuple):
         return sparse.csc_matrix((self.data, self.indices, self.indptr), shape=self.shape)
 
     def dense(self, *, mirrored: bool = False) -> Array:
-        """The same as an array (rows, columns); `mirrored`: the symmetric one of which this is the upper triangle."""
+        """The same as an array (rows, columns); with `mirrored`, the symmetric matrix whose upper triangle this is."""
         out = np.zeros(self.shape)
         _fill_dense(self.data, self.indices, self.indptr, mirrored, out)
         return out
 
 
 class BlockMatrix:
-    """The pattern of a sparse matrix made of parts that do not overlap, and the numbers that do not change."""
+    """A sparse matrix made of parts that do not overlap: its pattern, and those of its numbers that never change."""
 
     def __init__(self, shape: tuple[int, int], parts: list[Part]):
         self.shape = shape
@@ -71,7 +71,7 @@ class BlockMatrix:
                 self._data[where] = part.still.ravel()[entries]
 
     def filled(self, values: tuple[Array, ...]) -> Sparse:
-        """The matrix, from one array (S, r, c) for each part that changes."""
+        """The matrix with the numbers of one array (S, r, c) for each part that changes."""
         data = self._data.copy()
         if len(values) != len(self._slots):
             raise ValueError(f"{len(values)} arrays for {len(self._slots)} parts that change")

@@ -1,4 +1,4 @@
-"""The call of Clarabel: set up for a program, its data replaced in place, asked again with care if it did badly."""
+"""Calls the solver Clarabel: it is set up once, its data are replaced in place, and a poor answer is solved again."""
 
 from dataclasses import replace
 from time import perf_counter
@@ -57,10 +57,10 @@ SETTINGS: dict[str, dict[str, Any]] = {
 
 
 class Clarabel:
-    """Clarabel set up for a program, which may be replaced by others with the same pattern and cones.
+    """Clarabel, set up for one program, whose data other programs with the same pattern and cones may replace.
 
     Args:
-        program: the first one.
+        program: the first program.
         settings: of Clarabel, see `SETTINGS`.
 
     Raises:
@@ -85,17 +85,17 @@ class Clarabel:
 
     @property
     def replaceable(self) -> bool:
-        """Whether the settings allow its data to be replaced."""
+        """Whether the settings allow the data to be replaced."""
         return bool(self._solver.is_data_update_allowed())
 
     def replace(self, program: ConicProgram) -> None:
-        """Make this the program that is solved."""
+        """Replace the program that is solved by this one."""
         data = {"P": program.P.data, "q": program.q, "A": program.A.data, "b": program.b}
         self._solver.update(**{key: values.tolist() for key, values in data.items()})  # it reads arrays slower
         self.program = program
 
     def solve(self, began: float | None = None) -> ConicAnswer:
-        """The answer; its time counts from `began`, a reading of `perf_counter`, or else from now."""
+        """Solve the program; its time counts from `began`, a reading of `perf_counter`, or else from now."""
         start = perf_counter() if began is None else began
         found = self._solver.solve()
         x, z = np.array(found.x), np.array(found.z)
@@ -103,14 +103,15 @@ class Clarabel:
 
 
 class ClarabelWithRetry:
-    """Clarabel for programs one after another, set up once as long as they have one pattern.
+    """Solves one program after another with Clarabel, which is set up once for as long as their pattern is the same.
 
-    It is fast because it trusts the first program's scaling and its own linear algebra. Where the certificate is `POOR`
-    or there is no answer, it is asked once more, carefully: with a scaling for this program, with refined and shorter
-    steps. The better of the two counts, and says so; a proof that there is none counts where no answer is `USABLE`.
+    The first try is fast because it uses the scaling of the first program and no iterative refinement. If its residual
+    is `POOR`, or if there is no answer, the program is solved once more, carefully: with a scaling of its own, with
+    refinement, and with shorter steps. The better of the two answers is returned, and its message says so. A proof that
+    there is no answer is returned if no answer is `USABLE`.
 
     Args:
-        step: share of the way to the boundary of the cones that the first try goes at once.
+        step: share of the way to the boundary of the cones that the first try goes in one step.
         options: of Clarabel, for both tries, on top of `SETTINGS`.
     """
 
@@ -120,7 +121,7 @@ class ClarabelWithRetry:
         self._clarabel: Clarabel | None = None
 
     def __call__(self, program: ConicProgram) -> ConicAnswer:
-        """The answer, in nan where there is none.
+        """Solve a program; the answer is nan where there is none.
 
         Raises:
             ValueError: an option that Clarabel does not have.

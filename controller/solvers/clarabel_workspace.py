@@ -1,4 +1,4 @@
-"""Clarabel kept for the wrench problems of one shape, one after another."""
+"""Clarabel, set up once for many wrench problems of the same shape."""
 
 from time import perf_counter
 from typing import Any
@@ -11,14 +11,14 @@ from pivoting.controller.wrench_problem import WrenchProblem
 
 
 class ClarabelWorkspace:
-    """Clarabel set up once for problems of one shape, whose data is replaced in place.
+    """Solves many wrench problems of one shape with Clarabel, which is set up once; each problem replaces its data.
 
     Args:
-        problem: the first one, which fixes number of contacts and dimension.
+        problem: the first problem, which determines the number of contacts and the dimension.
         options: settings of Clarabel, on top of the tight ones that are the default here.
 
     Raises:
-        ValueError: a setting that Clarabel does not have, or with which its data cannot be replaced.
+        ValueError: a setting that Clarabel does not have, or with which the data cannot be replaced.
     """
 
     def __init__(self, problem: WrenchProblem, **options: Any):
@@ -33,7 +33,7 @@ class ClarabelWorkspace:
         """Replace the problem by another of the same shape.
 
         Raises:
-            ValueError: another number of contacts or dimension.
+            ValueError: the number of contacts or the dimension differs.
         """
         if problem.jacobian.shape != self._problem.jacobian.shape:
             raise fail("problem", problem.jacobian.shape, f"of the workspace's shape {self._problem.jacobian.shape}")
@@ -42,7 +42,7 @@ class ClarabelWorkspace:
         self._problem, self._unit = problem, unit
 
     def solve(self, *, tolerance: float = TOLERANCE) -> Solution:
-        """The certified answer to the problem set last, see `solve`.
+        """The certified answer to the current problem, see `solve`.
 
         Raises:
             SolveError: no answer within tolerance.

@@ -1,4 +1,4 @@
-"""The call of the compiled closed forms, and of the compiled interior point for several contacts."""
+"""Calls the compiled solvers: the closed forms for one contact, and the interior point for several."""
 
 import numpy as np
 from pivoting.controller.kernels.interior_point import contact_wrench
@@ -9,7 +9,7 @@ from pivoting.controller.wrench_problem import WrenchProblem
 
 
 def closed_form(problem: WrenchProblem) -> tuple[Array, Array]:
-    """The smallest wrench w (nw,) and its contact forces f (K d,) [N, N m], not certified."""
+    """Compute the smallest wrench w (nw,) and its contact forces f (K d,) [N, N m], without certifying them."""
     nw, n = problem.jacobian.shape
     f, w = np.empty(n), np.empty(nw)
     # copies that may be written, as in the loop: of read-only arrays numba would compile everything again

@@ -1,8 +1,8 @@
-"""Convex quadratic programs over half-lines and second-order cones: what they are, and what certifies their answers.
+"""Convex quadratic programs over half-lines and second-order cones, their answers, and the residual of an answer.
 
     min 1/2 x'P x + q'x   s.t.   A x + s = b,   s in {0}^zero x (half-lines)^linear x (second-order cones)
 
-A second-order cone is {(t, u): |u| <= t}. Without one, it is a QP and any backend of qpsolvers will do.
+A second-order cone is {(t, u): |u| <= t}. A program without one is a QP, which any backend of qpsolvers can solve.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,12 @@ USABLE = 1e-6  # relative KKT residual up to which an answer is taken
 
 
 class Cones(NamedTuple):
-    """zero, linear: numbers of rows.  orders: sizes of the second-order cones, in rows that come after those."""
+    """The kinds of a program's rows, in this order.
+
+    Attributes:
+        zero, linear: numbers of equalities and of half-lines.
+        orders: sizes of the second-order cones, in rows.
+    """
 
     zero: int
     linear: int
@@ -26,9 +31,9 @@ class Cones(NamedTuple):
 
 
 class ConicProgram(NamedTuple):
-    """P: (n, n) upper triangle.  A: (m, n).
+    """A conic program, with P (n, n), of which the upper triangle is stored, and A (m, n).
 
-    Their patterns hold every entry that may be other than zero, so that two programs of one origin have the same.
+    Their patterns contain every entry that may be nonzero, so that all programs from one source have the same pattern.
     """
 
     P: Sparse
@@ -40,10 +45,10 @@ class ConicProgram(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ConicAnswer:
-    """What a solver gave for a program.
+    """The answer of a solver to a program.
 
     Attributes:
-        program: what was to be solved.
+        program: the program that was to be solved.
         x: (n,), z: (m,) multipliers of the rows; nan where the solver gave none.
         message: the solver's own report.
         seconds: inside the solver.
@@ -57,27 +62,28 @@ class ConicAnswer:
 
     @cached_property
     def residual(self) -> float:
-        """Relative KKT residual, see `program_residual`: computed here, whatever the solver reported."""
+        """The relative KKT residual, see `program_residual`, computed here and not by the solver."""
         return program_residual(self.program, self.x, self.z)
 
 
 def no_answer(program: ConicProgram, message: str, seconds: float) -> ConicAnswer:
-    """The answer of a solver that gave none: nan, which no certificate passes."""
+    """The answer that stands for none: it consists of nan, which never passes as certified."""
     return ConicAnswer(program, np.full(len(program.q), np.nan), np.full(len(program.b), np.nan), message, seconds)
 
 
 class ConicSolver(Protocol):
-    """What solves programs, one after another."""
+    """A function that solves one program after another."""
 
     def __call__(self, program: ConicProgram) -> ConicAnswer:
-        """The answer, in nan where there is none."""
+        """Solve a program; the answer is nan where there is none."""
         ...
 
 
 def program_residual(program: ConicProgram, x: Array, z: Array) -> float:
-    """Of x (n,) and multipliers z (m,): the greatest of four, each relative to its own largest term, at least 1.
+    """The relative KKT residual of x (n,) and multipliers z (m,): the greatest of four residuals.
 
-    Distance of s from its cone, of z from the dual one, stationarity, complementarity; nan if they are not finite.
+    They are the distance of s from its cone and of z from the dual cone, stationarity, and complementarity. Each is
+    relative to its own largest term or to 1, whichever is greater. The result is nan if they are not finite.
     """
     P, A, (zero, linear, orders) = program.P, program.A, program.cones
     cones = zero, linear, np.array(orders, dtype=np.int64)

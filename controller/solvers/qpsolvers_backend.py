@@ -1,4 +1,4 @@
-"""The call of a QP solver through qpsolvers: which backends there are, what is asked of them, and their answers."""
+"""Calls a QP solver through the package qpsolvers: the backends that are installed, their options, their answers."""
 
 import contextlib
 import os
@@ -43,7 +43,7 @@ SMALL = 30  # columns up to which matrices are dense where a backend takes both 
 
 
 def installed_backend(method: str) -> str:
-    """The backend that "qp:<backend>" names; no other is tried.
+    """The backend that "qp:<backend>" names; no other backend takes its place.
 
     Raises:
         ValueError: it is not installed, or does not solve.
@@ -57,12 +57,14 @@ def installed_backend(method: str) -> str:
 
 
 def installed_backends() -> list[str]:
-    """The names of all backends that solve here: it depends on what is installed and licensed."""
+    """The names of all backends that can solve here, which depends on what is installed and licensed."""
     return [name for name in sorted(_qpsolvers().available_solvers) if _answers(name)]
 
 
 class QuadraticBackend:
-    """A backend of qpsolvers, which takes programs without second-order cones; conversions are kept for one pattern.
+    """Solves programs without second-order cones with a backend of qpsolvers.
+
+    What it converts, it keeps as long as the pattern of the programs stays the same.
 
     Args:
         name: of the backend, see `installed_backend`.
@@ -83,7 +85,7 @@ class QuadraticBackend:
         self._split: _Split | None = None
 
     def __call__(self, program: ConicProgram) -> ConicAnswer:
-        """The answer, in nan where there is none.
+        """Solve a program; the answer is nan where there is none.
 
         Raises:
             ValueError: an option that the backend does not have, or a program with second-order cones.

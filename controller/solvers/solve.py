@@ -1,4 +1,4 @@
-"""Solving a wrench problem: compiled kernels, Clarabel, or any QP backend of qpsolvers; every answer is certified."""
+"""Solves wrench problems by compiled kernels, Clarabel or any QP backend of qpsolvers, and certifies every answer."""
 
 from collections.abc import Callable
 from functools import partial
@@ -22,13 +22,13 @@ Route = Callable[[WrenchProblem, int], tuple[Array, Array, str]]  # edges; wrenc
 def solve(
     problem: WrenchProblem, method: str = "closed-form", *, tolerance: float = TOLERANCE, **options: Any
 ) -> Solution:
-    """Solve `problem` and certify the answer.
+    """Solve a wrench problem and certify the answer.
 
     Args:
         problem: the wrench problem.
         method: "closed-form" (compiled: closed form for one contact, an interior point with a polish for several),
             "clarabel", or "qp:<backend>" with any backend of qpsolvers that is installed (see `methods`). A QP has no
-            round cones: in space it is given inscribed pyramids. Its answer is feasible but costs more than the
+            round cones, so in space it gets inscribed pyramids. Its answer is feasible but costs more than the
             optimum (`pyramid_excess`), so its status is "inscribed", never "solved", and its residual is that of
             the program with pyramids; `problem.residual` tells how far it is from the optimum of the cones.
         tolerance: largest relative KKT residual of an answer that is returned.
@@ -51,9 +51,9 @@ def solve(
 
 
 def pyramid_excess(problem: WrenchProblem, edges: int = EDGES, *, backend: str = "daqp") -> float:
-    """How much more, relatively, the optimum of inscribed pyramids costs than that of the cones: the price of a QP.
+    """How much more the optimum with inscribed pyramids costs than that with round cones, relative to the latter.
 
-    About (1 - cos(pi / edges)) of the friction is given up between two vertices; 0 where there is nothing to pay.
+    Between two vertices a pyramid gives up about (1 - cos(pi / edges)) of the friction. 0 if it costs nothing.
 
     Raises:
         SolveError, ValueError: as `solve`.
@@ -64,7 +64,7 @@ def pyramid_excess(problem: WrenchProblem, edges: int = EDGES, *, backend: str =
 
 
 def methods() -> tuple[str, ...]:
-    """Every method that `solve` can use here: the backends of qpsolvers depend on what is installed and licensed."""
+    """The names of all methods that `solve` can use here, which depends on what is installed and licensed."""
     return ("closed-form", "clarabel", *(f"qp:{name}" for name in installed_backends()))
 
 

@@ -1,4 +1,4 @@
-"""A wrench problem as a conic program in x = (f, w), in units of its load; with pyramids for cones, as a QP."""
+"""Wrench problems as conic programs in x = (f, w), in units of their load; with pyramids for cones they are QPs."""
 
 from functools import cache
 
@@ -11,16 +11,16 @@ from pivoting.controller.wrench_problem import WrenchProblem
 
 
 class WrenchProgram:
-    """Assembles the conic programs of wrench problems of one shape; all in it is constant.
+    """Assembles the conic programs of wrench problems of one shape.
 
         min 1/2 f'Q_f f + 1/2 w'Q_w w   s.t.   J f + w = required,   f in its truncated friction cones
 
-    Forces are in units of the load and weights of the order of one. The cones are homogeneous, so that this changes
-    nothing but what a solver's absolute tolerances mean.
+    Forces are in units of the load, and the weights are scaled to the order of one. Since the cones are homogeneous,
+    this changes nothing except the meaning of a solver's absolute tolerances.
 
     Args:
         contacts, dim: of the problems.
-        edges: of the pyramids that stand for the cones in space; 0: the cones themselves.
+        edges: number of edges of the pyramids that replace the cones in space; 0 for the cones themselves.
     """
 
     def __init__(self, contacts: int, dim: int, edges: int = 0):
@@ -47,7 +47,7 @@ class WrenchProgram:
         self._P = BlockMatrix((n + nw, n + nw), weights)
 
     def assemble(self, problem: WrenchProblem) -> tuple[ConicProgram, float]:
-        """The program, and the unit [N] of its forces, which is 0 without a load: the answer is then exactly zero."""
+        """The program and the unit [N] of its forces; without a load the unit is 0, and the answer exactly zero."""
         # lists are faster than NumPy for so few; no entry of a positive definite matrix exceeds those on its diagonal
         unit = max(map(abs, problem.required.tolist() + problem.f_min.tolist()))
         scale = unit or 1.0
@@ -60,7 +60,7 @@ class WrenchProgram:
         return ConicProgram(P, np.zeros(A.shape[1]), A, b, self.cones), unit
 
     def wrench_and_force(self, x: Array, unit: float) -> tuple[Array, Array]:
-        """w (nw,) and f (K d,) in SI units, from an answer to a program of that unit."""
+        """The wrench (nw,) and the forces (K d,) in SI units, from an answer to a program with forces in `unit`."""
         full = unit * x
         n = len(full) - self.cones.zero
         return full[n:].copy(), full[:n].copy()
@@ -68,5 +68,5 @@ class WrenchProgram:
 
 @cache
 def wrench_program(contacts: int, dim: int, edges: int = 0) -> WrenchProgram:
-    """The `WrenchProgram` of a shape, made once."""
+    """The `WrenchProgram` of a shape, which is made once and kept."""
     return WrenchProgram(contacts, dim, edges)
