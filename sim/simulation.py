@@ -1,12 +1,14 @@
 """`simulate`: a closed-loop run, from a scenario to what is measured."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 from pivoting.controller.orientation_references import Turn
+from pivoting.controller.references import Reference
 from pivoting.controller.validate import fail
 from pivoting.controller.wrench_controller import WrenchController
 from pivoting.models.errors import ModelError
@@ -20,7 +22,7 @@ from pivoting.sim.pipeline.bounded_control import BoundedControl
 from pivoting.sim.pipeline.contact_log import ContactLog
 from pivoting.sim.pipeline.law_control import LawControl, LawSolver
 from pivoting.sim.pipeline.log import Log
-from pivoting.sim.pipeline.loop import run_steps
+from pivoting.sim.pipeline.loop import Steps, run_steps
 from pivoting.sim.pipeline.own_control import OwnControl, OwnControlFunction
 from pivoting.sim.pipeline.plan_playback import PlanPlayback
 from pivoting.sim.pipeline.plant import Plant
@@ -76,8 +78,16 @@ def simulate(
     asked = (scenario(name) if isinstance(name, str) else name).change(**overrides)
     asked.refuse_without_effect(overrides, open_loop)
     begun = set_up(asked, controller, worlds=worlds, seed=seed, first_world=first_world)
-    decided = _control(begun, control, observe, open_loop)
-    return _run(begun, decided, progress)
+    stages = stages_of(begun, observe)
+    decided = decide(begun, stages, law_of(begun, stages), control, open_loop)
+    batch = start_batch(begun, decided)
+    start = start_of(batch)
+    apply = FreeWrench(batch, begun.belief.attached.controller.belief.wrench_map, begun.world.truth.index)
+    with engine_log() as warned:
+        log, wall_s = run_steps(steps_of(begun, decided, Plant(batch), apply), progress)
+    handed = {"controller": controller, "control": control, "observe": observe}
+    objects = tuple(name for name, given in handed.items() if given is not None)
+    return kept(begun, decided, start, log, wall_s, (*begun.world.warned, *warned), objects)
 
 
 class Begun(NamedTuple):
@@ -85,7 +95,6 @@ class Begun(NamedTuple):
 
     reference: angles, rates, accelerations (N+1,).  desired, told: orientations and their rates, as the world has the
     table and as the controller knows it.  follow: the latter at any time.  setting: of the stages.
-    given: whether the controller was handed in.
     """
 
     asked: Scenario
@@ -98,7 +107,6 @@ class Begun(NamedTuple):
     told: Samples
     follow: Turn
     setting: Setting
-    given: bool
 
     @property
     def steps(self) -> int:
@@ -106,13 +114,12 @@ class Begun(NamedTuple):
         return len(self.time) - 1
 
 
-class _Decided(NamedTuple):
-    """What decides: the control, with the law that it ends in, and the stages around it; what of it was handed in."""
+class Decided(NamedTuple):
+    """What decides: the control, with the law that it ends in, and the stages around it."""
 
     control: Control
     per_step: LawControl
     stages: Stages
-    python_objects: tuple[str, ...]
 
 
 def set_up(asked: Scenario, controller: WrenchController | None, *, worlds: int, seed: int, first_world: int) -> Begun:
@@ -124,32 +131,56 @@ def set_up(asked: Scenario, controller: WrenchController | None, *, worlds: int,
     belief = believe(asked, scene, controller)
     case = asked.absolute(belief.placement.load)
     world = build_world(case, belief.scene, scene, belief.placement)
-    time = _times(case, world.dt, int(worlds))
+    turning = -matrix(belief.placement.body.table)[:, 1:2].T if belief.placement.body.dim == 2 else np.eye(3)
+    counts = int(seed), int(worlds), int(first_world)
+    setting = Setting(*counts, world.dt, turning, belief.attached.controller.law)
+    timed = _timed(case, belief, world, int(worlds))
+    return Begun(asked, case, belief, world, *timed, setting)
+
+
+def on_reference(begun: Begun, reference: Reference, seconds: float) -> Begun:
+    """The same world and belief on another reference, for a time [s].
+
+    Raises:
+        ValueError: it does not keep the object on its contact.
+    """
+    case = replace(begun.case, reference=reference, seconds=seconds)
+    timed = _timed(case, begun.belief, begun.world, begun.setting.worlds)
+    return Begun(begun.asked, case, begun.belief, begun.world, *timed, begun.setting)
+
+
+def _timed(
+    case: Scenario, belief: Believed, world: World, worlds: int
+) -> tuple[Array, Samples, Samples, Samples, Turn]:
+    """Time, reference, desired, told and follow; see `Begun`."""
+    time = _times(case, world.dt, worlds)
     reference, desired, _ = _desired(case, world.placement, time)
     told, follow = _desired(case, belief.placement, time)[1:]  # the controller knows only the table that it believes in
     for values in (time, *reference, *desired):
         values.flags.writeable = False
-    turning = -matrix(belief.placement.body.table)[:, 1:2].T if belief.placement.body.dim == 2 else np.eye(3)
-    counts = int(seed), int(worlds), int(first_world)
-    setting = Setting(*counts, world.dt, turning, belief.attached.controller.law)
-    return Begun(
-        asked, case, belief, world, time, reference, desired, told, follow, setting, given=controller is not None
-    )
+    return time, reference, desired, told, follow
 
 
-def _control(begun: Begun, own: OwnControlFunction | None, observe: Observe | None, open_loop: bool) -> _Decided:
-    """The scenario's control, or the user's own, and the stages around it."""
+def stages_of(begun: Begun, observe: Observe | None = None) -> Stages:
+    """The stages around the control that the scenario asks for, and an observer of the user's own."""
+    stages = build_stages(begun.case.stages, begun.setting)
+    return stages if observe is None else stages._replace(observe=(*stages.observe, observe))
+
+
+def law_of(begun: Begun, stages: Stages) -> LawSolver:
+    """The scenario's law, within its bounds."""
+    return LawSolver(begun.belief.attached.controller, begun.case.bounds(begun.belief.placement.unit), stages.correct)
+
+
+def decide(
+    begun: Begun, stages: Stages, law: LawSolver, own: OwnControlFunction | None = None, open_loop: bool = False
+) -> Decided:
+    """The scenario's control, which ends in the `law`, or the user's own."""
     case, (_, attached, there) = begun.case, begun.belief
-    stages = build_stages(case.stages, begun.setting)
-    if observe is not None:
-        stages = stages._replace(observe=(*stages.observe, observe))
     bounds, dt = case.bounds(there.unit), begun.world.dt
-    law = LawSolver(attached.controller, bounds, stages.correct)
     per_step = LawControl(law, begun.told, drag_wrench(attached.body, attached.controller, *begun.told))
-    handed = {"controller": begun.given, "control": own is not None, "observe": observe is not None}
-    objects = tuple(name for name, there_is in handed.items() if there_is)
     if own is not None:
-        return _Decided(OwnControl(own, begun.told, dt), per_step, stages, objects)
+        return Decided(OwnControl(own, begun.told, dt), per_step, stages)
     if attached.body.drag is not None and (open_loop or case.plan_hz is not None):
         raise ModelError(f"body = {attached.body.name!r}: a plan knows no joint damping or friction; must have none")
     control: Control = per_step
@@ -160,37 +191,45 @@ def _control(begun: Begun, own: OwnControlFunction | None, observe: Observe | No
         control = receding_horizon_control(case, begun.belief, law, begun.follow, worlds, dt, begun.steps)
     if bounds.any and not open_loop:  # a plan is within them
         control = BoundedControl(control, attached.controller, bounds, dt)
-    return _Decided(control, per_step, stages, objects)
+    return Decided(control, per_step, stages)
 
 
-def _run(begun: Begun, decided: _Decided, progress: Callable[[int, int], None] | None) -> Run:
-    """Start the worlds, make the steps, and keep what came of them."""
+def start_batch(begun: Begun, decided: Decided) -> Batch:
+    """The worlds where they start."""
     world, attached = begun.world, begun.belief.attached
     seed, worlds, first = begun.setting[:3]
     batch = Batch(world.model, worlds, nthread=1 if worlds == 1 else 0, persistent=True)
     errors = np.random.default_rng(seed).uniform(-1.0, 1.0, first + worlds)[first:]
     depth = resting_depth(world, attached, decided.per_step, begun.told) if begun.case.chosen else 0.0
     start_worlds(batch, world, begun.desired, np.deg2rad(begun.case.spread) * errors, depth)
+    return batch
+
+
+def start_of(batch: Batch) -> tuple[Array, Array]:
+    """qpos (W, nq) and qvel (W, nv) of the worlds as they are, for `Trajectory.start`."""
     start = np.array(batch.bind("qpos")), np.array(batch.bind("qvel"))
     for values in start:
         values.flags.writeable = False
-    table, wrench_map = matrix(world.truth.table), attached.controller.belief.wrench_map
-    contacts = ContactLog(world.declared, world.contact_rows, table, world.sensors, begun.steps, worlds)
-    apply, widths = FreeWrench(batch, wrench_map, world.truth.index), attached.controller.widths
-    with engine_log() as warned:
-        log, wall_s = run_steps(
-            Plant(batch), decided.stages, decided.control, apply, contacts, begun.steps, widths, progress
-        )
-    return _kept(begun, decided, start, log, wall_s, (*world.warned, *warned))
+    return start
 
 
-def _kept(
+def steps_of(begun: Begun, decided: Decided, plant: Plant, apply: FreeWrench) -> Steps:
+    """The steps that a run is to make, from the states that the plant has."""
+    world = begun.world
+    table, counts = matrix(world.truth.table), (begun.steps, plant.worlds)
+    contacts = ContactLog(world.declared, world.contact_rows, table, world.sensors, *counts)
+    widths = begun.belief.attached.controller.widths
+    return Steps(plant, decided.stages, decided.control, apply, contacts, begun.steps, widths)
+
+
+def kept(
     begun: Begun,
-    decided: _Decided,
+    decided: Decided,
     start: tuple[Array, Array],
     log: Log,
     wall_s: float,
-    warnings: tuple[str, ...],
+    warnings: tuple[str, ...] = (),
+    python_objects: tuple[str, ...] = (),
 ) -> Run:
     """The finished run."""
     planned = decided.control.inner if isinstance(decided.control, BoundedControl) else decided.control
@@ -212,7 +251,7 @@ def _kept(
         plans=None if horizons is None else horizons.log,
         events=() if horizons is None else tuple(horizons.events),
         engine_warnings=warnings,
-        python_objects=decided.python_objects,
+        python_objects=python_objects,
     )
 
 

@@ -16,55 +16,88 @@ from pivoting.sim.pipeline.stages import Answers, Control, Stages, States
 Array = NDArray[np.float64]
 
 
-def run_steps(
-    plant: Plant,
-    stages: Stages,
-    control: Control,
-    apply: FreeWrench,
-    contacts: ContactLog,
-    steps: int,
-    widths: tuple[int, int],
-    progress: Callable[[int, int], None] | None,
-) -> tuple[Log, float]:
-    """Step all worlds to the end.
+class Steps:
+    """The steps of a run, some at a time: what each of its stages gives is logged.
 
     Args:
+        steps: how many there may be, N.
         widths: nw and K d.
-        progress: called with (steps done, steps) about a hundred times.
+
+    Attributes:
+        log: of all N steps, with (step, world) first; those beyond `made` are yet to be written.
+        made: how many steps were made.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        stages: Stages,
+        control: Control,
+        apply: FreeWrench,
+        contacts: ContactLog,
+        steps: int,
+        widths: tuple[int, int],
+    ):
+        self._plant, self._stages, self._control, self._apply, self._contacts = plant, stages, control, apply, contacts
+        self.log, self.made = empty_log(steps, plant.worlds, widths, (contacts.readings, contacts.held), stages), 0
+        self._block = np.empty((max(1, min(steps, BLOCK // plant.worlds)), *plant.sensed.shape))
+        self._before: Array | None = None
+        self.log.states[0] = plant.sensed[:, :STATE]
+
+    def prepare(self) -> None:
+        """Compile all that a step calls, so that no step waits for it."""
+        log, states = self.log, self._plant.states
+        nw = log.answers.nw
+        with first_calls():
+            first_answers = Answers(log.answers.values[0], log.answers.status[0], nw)
+            self._control.prepare(states, first_answers)
+            self._apply(states, first_answers.values, nw, log.wrench_world[0])
+            self._contacts.sort(0, log.states[:0], self._block[:0])
+
+    def make(self, last: int, progress: Callable[[int, int], None] | None = None) -> None:
+        """Make the steps up to number `last`.
+
+        Args:
+            progress: called with (steps done, steps) about a hundred times in N steps.
+        """
+        plant, stages, control, apply, contacts = self._plant, self._stages, self._control, self._apply, self._contacts
+        log, block, before, states = self.log, self._block, self._before, plant.states
+        nw, steps, first = log.answers.nw, len(log.control_ns), self.made
+        report = max(1, steps // 100)
+        answers = zip(log.answers.values[first:last], log.answers.status[first:last], strict=True)
+        for k, (values, status) in enumerate(answers, first):
+            tick = perf_counter_ns()
+            seen = states if not stages.sense and not stages.observe else _seen(k, states, before, stages, log)
+            control(k, seen, before, answer := Answers(values, status, nw))
+            log.control_ns[k] = perf_counter_ns() - tick
+            before = answer.wrench
+            acting, column = (values, nw) if not stages.actuate else (_acting(k, before, stages, log), 0)
+            apply(states, acting, column, log.wrench_world[k])
+            plant.step()
+            block[k - first] = plant.sensed
+            if k + 1 - first == len(block) or k + 1 == last:
+                sensed = block[: k + 1 - first]
+                log.states[first + 1 : k + 2] = sensed[..., :STATE]
+                contacts.sort(first, log.states[first : k + 1], sensed)
+                first = k + 1
+            if progress is not None and (k + 1) % report == 0:
+                progress(k + 1, steps)
+        self.made, self._before = last, before
+
+
+def run_steps(steps: Steps, progress: Callable[[int, int], None] | None) -> tuple[Log, float]:
+    """Make all steps.
+
+    Args:
+        progress: see `Steps.make`.
 
     Returns:
         The log, and the time that it took [s].
     """
-    log = empty_log(steps, plant.worlds, widths, (contacts.readings, contacts.held), stages)
-    block = np.empty((max(1, min(steps, BLOCK // plant.worlds)), *plant.sensed.shape))
-    states, nw = plant.states, log.answers.nw
-    log.states[0] = plant.sensed[:, :STATE]
-    with first_calls():  # compiled before it is timed
-        first_answers = Answers(log.answers.values[0], log.answers.status[0], nw)
-        control.prepare(states, first_answers)
-        apply(states, first_answers.values, nw, log.wrench_world[0])
-        contacts.sort(0, log.states[:0], block[:0])
-    report, first = max(1, steps // 100), 0
+    steps.prepare()  # compiled before it is timed
     start = perf_counter()
-    before: Array | None = None
-    for k, (values, status) in enumerate(zip(*log.answers[:2], strict=True)):
-        tick = perf_counter_ns()
-        seen = states if not stages.sense and not stages.observe else _seen(k, states, before, stages, log)
-        control(k, seen, before, answers := Answers(values, status, nw))
-        log.control_ns[k] = perf_counter_ns() - tick
-        before = answers.wrench
-        acting, column = (values, nw) if not stages.actuate else (_acting(k, before, stages, log), 0)
-        apply(states, acting, column, log.wrench_world[k])
-        plant.step()
-        block[k - first] = plant.sensed
-        if k + 1 - first == len(block) or k + 1 == steps:
-            sensed = block[: k + 1 - first]
-            log.states[first + 1 : k + 2] = sensed[..., :STATE]
-            contacts.sort(first, log.states[first : k + 1], sensed)
-            first = k + 1
-        if progress is not None and (k + 1) % report == 0:
-            progress(k + 1, steps)
-    return worlds_first(log), perf_counter() - start
+    steps.make(len(steps.log.control_ns), progress)
+    return worlds_first(steps.log), perf_counter() - start
 
 
 def _seen(k: int, states: States, before: Array | None, stages: Stages, log: Log) -> States:
