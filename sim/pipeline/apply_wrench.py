@@ -1,4 +1,4 @@
-"""The wrench as MuJoCo takes it: turned into world axes and written to `xfrc_applied` of the object."""
+"""The wrench as MuJoCo takes it: turned into world axes and written to `xfrc_applied` of the object; and a push."""
 
 import numpy as np
 from mujoco.batch import Batch
@@ -28,3 +28,23 @@ class FreeWrench:
             out: (W, 6), written: what is applied, force and torque at the centre of mass, world axes.
         """
         apply_wrenches(self._map, states.values, wrenches, first, out, self._xfrc, self._body)
+
+
+class PushedWrench(FreeWrench):
+    """The same, and for some steps a push that the control neither makes nor knows of, and that no log shows.
+
+    Attributes:
+        push: (6,) force and torque at the centre of mass, world axes, of every world.
+        steps: for how many more steps it acts.
+    """
+
+    def __init__(self, batch: Batch, wrench_map: Array, body: int):
+        super().__init__(batch, wrench_map, body)
+        self.push, self.steps = np.zeros(6), 0
+
+    def __call__(self, states: States, wrenches: Array, first: int, out: Array) -> None:
+        """As of `FreeWrench`; `out` is without the push."""
+        super().__call__(states, wrenches, first, out)
+        if self.steps > 0:
+            self.steps -= 1
+            self._xfrc[:, self._body] += self.push

@@ -62,6 +62,20 @@ def empty_log(
     )
 
 
+def some_steps(log: Log, first: int, last: int) -> Log:
+    """Steps `first` to `last` - 1 of a log that has (step, world) first, with the states around them."""
+
+    def cut(values: Any, most: int = last) -> Any:
+        if values is None or isinstance(values, int):
+            return values
+        if isinstance(values, tuple):
+            return type(values)(*(cut(value) for value in values))
+        return values[first:most]
+
+    within = {name: cut(values) for name, values in log._asdict().items()}
+    return log._replace(**{**within, "states": cut(log.states, last + 1)})
+
+
 def worlds_first(log: Log) -> Log:
     """With (world, step) first, read-only."""
     log.control_ns.flags.writeable = False
