@@ -129,7 +129,7 @@ class LiveControls:
     def _world(self) -> None:
         with self._gui.add_folder("the world"):
             self._knows = self._gui.add_checkbox(
-                "the controller knows", False, hint="whether the controller is told of what you change here"
+                "controller knows", False, hint="whether the controller is told of what you change here"
             )
             for key in SCENE_KEYS:
                 self._slider(key)

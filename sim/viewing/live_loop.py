@@ -166,7 +166,7 @@ class LiveLoop:
         table, axis = matrix(self.world.truth.table), self.world.turn[0]
         level = np.cross(table[:, 2], axis)
         size = float(np.linalg.norm(level))
-        return -level / size if size > 0.5 else table[:, 0]
+        return level / size if size > 0.5 else table[:, 0]
 
     @property
     def diverged(self) -> bool:
@@ -190,16 +190,16 @@ class LiveLoop:
         """Judge the lap, and go on."""
         verdict = self.run().verdict
         self.passed, self.failed = self.passed + (verdict == "pass"), self.failed + (verdict == "fail")
-        self.notes.append(f"Lap {self.lap} of {self.seconds:g} s: {verdict}.")
         angle, rate, _ = self._whole.reference
         closed = max(abs(angle[-1] - angle[0]), abs(rate[0]), abs(rate[-1])) < STILL
         self.laps_left -= 1
+        again = "" if closed or self.laps_left > 0 else " The object was put back to its start."
+        self.notes.append(f"Lap {self.lap} of {self.seconds:g} s: {verdict}.{again}")
         if self.laps_left > 0:
             self._begin(from_now(self._reference, self.seconds), self.seconds)
         elif closed:
             self._begin_cycle()
         else:
-            self.notes.append("The motion does not end where it begins: the object was put back to its start.")
             self.restart()
 
     def run(self, first: int = 0) -> Run:

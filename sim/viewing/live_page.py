@@ -82,6 +82,7 @@ class LivePage:
         """The view that new clients begin with: that of the recordings."""
         world, camera = scene.world, self._server.initial_camera
         camera.fov = float(np.deg2rad(35.0))
+        camera.near, camera.far = 0.01 * world.side, 100.0 * world.side
         camera.look_at = tuple(world.centre)
         camera.position = tuple(world.centre + 2.5 * world.eye(world.away if world.dim == 2 else world.along_axis))
 
@@ -201,9 +202,10 @@ class LivePage:
         )
 
     def _notes(self) -> str:
-        told = "".join(f"<div style='opacity:0.75'>{note}</div>" for note in self.loop.notes[-TOLD:])
+        told = "".join(f"<div style='opacity:0.75'>{note}</div>" for note in self.loop.notes[: -TOLD - 1 : -1])
         refused = f"<div id='refused' style='color:#d62728'>Refused: {self.refused}</div>" if self.refused else ""
-        return f"<div style='padding:0 0.6em;font-size:0.8em'>{refused}{told}</div>"
+        style = "padding:0 0.6em;font-size:0.8em;line-height:1.3;height:4em;overflow:auto"
+        return f"<div style='{style}'>{refused}{told}</div>"
 
 
 def _check_address(host: str, port: int) -> None:

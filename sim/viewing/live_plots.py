@@ -10,7 +10,7 @@ from pivoting.sim.run import Run
 from pivoting.sim.run_arrays import WRENCH
 
 POINTS = 300  # of a line, at most
-HEIGHT = 125  # of a plot, in pixels
+HEIGHT = 108  # of a plot, in pixels
 BLUE, RED_, GREEN_, BLACK, ORANGE_, PURPLE_ = (
     (31, 119, 180), (214, 39, 40), (44, 160, 44), (60, 60, 60), (255, 127, 14), (148, 103, 189),
 )  # fmt: skip
@@ -42,9 +42,8 @@ def plots_of(run: Run, world: int = 0) -> tuple[Array, list[Plot]]:
     rows = np.unique(np.linspace(1, last, min(POINTS, last)).astype(int))
     same = np.ones(rows.size)
     limits, unit = run.limits, run.unit
-    slips = [
-        1e3 * unit * np.linalg.norm(each[world, rows], axis=-1).max(axis=-1) for each in (run.slip, predicted_slip(run))
-    ]
+    moved = run.slip, predicted_slip(run)
+    slips = [1e3 * unit * np.linalg.norm(each[world, rows], axis=-1).max(axis=-1) for each in moved]
     assert limits.slip_m is not None, "limits are for a lever"
     measured = np.nan_to_num(run.friction_use[world, rows - 1], nan=-1.0).max(axis=-1)
     planned = float((run.attached.controller.belief.mu / run.world.mu).max())
@@ -100,6 +99,7 @@ class LivePlots:
                 scales=_scales(plot, seconds),
                 legend={"show": True, "live": False},
                 height=HEIGHT,
+                padding=(8, 20, 0, 0),
             )
             for plot in plots
         ]
@@ -128,6 +128,6 @@ def _scales(plot: Plot, seconds: float) -> dict[str, Any]:
     values = np.concatenate([line.values for line in plot.lines])
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
-    step = 10.0 ** np.floor(np.log10(max(high - min(low, 0.0), 1e-9)))
-    low, high = step * np.floor(min(low, 0.0) / step), step * np.ceil((high + 1e-9) / step)
+    step = 0.25 * 10.0 ** np.floor(np.log10(max(high - min(low, 0.0), 1e-9)))
+    low, high = step * np.floor(1.05 * min(low, 0.0) / step), step * np.ceil(1.05 * max(high, 0.1 * step) / step)
     return {"x": {"time": False, "range": (0.0, seconds)}, "y": {"range": (float(low), float(high))}}
