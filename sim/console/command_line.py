@@ -227,15 +227,13 @@ def view(scenario: str | None, settings: tuple[str, ...], seed: int, host: str, 
     far, plots and the solution space. Needs viser: pip install 'pivoting[view]'. --set takes the keys of `pivoting
     run`.
     """
-    from importlib.util import find_spec
-
     from pivoting.sim.console.asked_run import ask
 
     asked = ask(
         _asked_name(scenario, own), None, worlds=1, seed=seed, settings=settings, limits=(), open_loop=False, **own
     )
-    if find_spec("viser") is None:
-        raise click.ClickException("view: needs viser, which is not installed: pip install 'pivoting[view]'")
+    if not _installed("viser"):
+        raise click.ClickException("view needs viser, which is not installed: pip install 'pivoting[view]'")
     from pivoting.sim.viewing.live_page import view as serve
 
     serve(asked.scenario, host, port, seed)
@@ -266,6 +264,13 @@ def _asked_name(scenario: str | None, own: dict[str, Any]) -> str:
     if scenario is None and own["model"] is None:
         raise click.UsageError("Missing argument 'SCENARIO', or --model FILE.xml --body NAME.")
     return scenario or "pivot"
+
+
+def _installed(package: str) -> bool:
+    """Whether it could be imported; None in place of a module says that it cannot."""
+    from importlib.util import find_spec
+
+    return sys.modules.get(package, package) is not None and find_spec(package) is not None
 
 
 def _advised(advice: dict[str, Any]) -> str:
