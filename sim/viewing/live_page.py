@@ -53,7 +53,7 @@ class LivePage:
             self._server.stop()
             raise fail("port", port, "one that is free")
         self.loop, self.url = loop, f"http://{host}:{bound}"
-        self.refused, self._told, self._real = "", "", 1.0
+        self.refused = ""
         self._grab: Grab | None = None
         loop.advance(1)
         self._build(loop.run())

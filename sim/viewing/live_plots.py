@@ -10,7 +10,8 @@ from pivoting.sim.run import Run
 from pivoting.sim.run_arrays import WRENCH
 
 POINTS = 300  # of a line, at most
-HEIGHT = 108  # of a plot, in pixels
+HEIGHT = 125  # of a plot, in pixels
+NUDGE = 1e-6  # an axis gets its numbers when a range changes: viser 1.1 fixes them too early for a new client
 BLUE, RED_, GREEN_, BLACK, ORANGE_, PURPLE_ = (
     (31, 119, 180), (214, 39, 40), (44, 160, 44), (60, 60, 60), (255, 127, 14), (148, 103, 189),
 )  # fmt: skip
@@ -91,12 +92,13 @@ class LivePlots:
     def __init__(self, gui: Any, run: Run, seconds: float):
         """In the container that is open.  seconds: that the lap takes."""
         times, plots = plots_of(run)
+        self._nudge = 0.0
         self._handles = [
             gui.add_uplot(
                 _data(times, plot),
                 ({"label": "time [s]"}, *(_series(line) for line in plot.lines)),
                 title=plot.title,
-                scales=_scales(plot, seconds),
+                scales=_scales(plot, seconds, 0.0),
                 legend={"show": True, "live": False},
                 height=HEIGHT,
                 padding=(8, 20, 0, 0),
@@ -107,11 +109,9 @@ class LivePlots:
     def show(self, run: Run, seconds: float) -> None:
         """A lap so far."""
         times, plots = plots_of(run)
+        self._nudge = NUDGE - self._nudge
         for handle, plot in zip(self._handles, plots, strict=True):
-            handle.data = _data(times, plot)
-            scales = _scales(plot, seconds)
-            if handle.scales != scales:
-                handle.scales = scales
+            handle.data, handle.scales = _data(times, plot), _scales(plot, seconds, self._nudge)
 
 
 def _series(line: Line) -> dict[str, Any]:
@@ -123,11 +123,11 @@ def _data(times: Array, plot: Plot) -> tuple[Array, ...]:
     return (times, *(line.values for line in plot.lines))
 
 
-def _scales(plot: Plot, seconds: float) -> dict[str, Any]:
-    """Axes that hold all that is finite, in steps, so that they rarely change."""
+def _scales(plot: Plot, seconds: float, nudge: float) -> dict[str, Any]:
+    """Axes as long as the lap, and as high as what is finite, in steps; higher by a share `nudge`."""
     values = np.concatenate([line.values for line in plot.lines])
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
     step = 0.25 * 10.0 ** np.floor(np.log10(max(high - min(low, 0.0), 1e-9)))
     low, high = step * np.floor(1.05 * min(low, 0.0) / step), step * np.ceil(1.05 * max(high, 0.1 * step) / step)
-    return {"x": {"time": False, "range": (0.0, seconds)}, "y": {"range": (float(low), float(high))}}
+    return {"x": {"time": False, "range": (0.0, seconds)}, "y": {"range": (float(low), float(high * (1.0 + nudge)))}}

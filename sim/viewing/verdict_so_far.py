@@ -59,7 +59,7 @@ def as_html(found: SoFar, run: Run) -> str:
     rows = "".join(_row(check) for check in found.checks)
     table = f"<table style='width:100%;font-size:0.8em;border-collapse:collapse'>{HEAD}{rows}</table>" if rows else ""
     return (
-        "<div style='padding:0 1.4em 0 0.6em;line-height:1.3'>"
+        "<div style='padding:0 1.4em 0 0.6em;line-height:1.3;min-height:215px'>"
         f"<div id='verdict' style='font-size:1.25em;font-weight:700;color:{colour}'>{found.verdict.upper()}"
         "<span style='font-weight:400;font-size:0.65em;opacity:0.8'> so far, in this lap</span></div>"
         f"<div style='font-size:0.85em;margin-bottom:0.4em'>{in_words(found, run)}</div>{table}</div>"

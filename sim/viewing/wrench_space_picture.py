@@ -6,7 +6,7 @@ import numpy as np
 from pivoting.sim.drawing.drawn_world import Array
 from pivoting.sim.viewing.live_world import LiveWorld
 
-WIDE, HIGH = 360.0, 300.0  # pixels
+WIDE, HIGH = 360.0, 236.0  # pixels
 AZIMUTH, ELEVATION = np.deg2rad(-72.0), np.deg2rad(28.0)  # from which it is seen
 CONE, BALANCE, WRENCH, LOAD, AXES = "#e08a1e", "#3a86c8", "#2ca02c", "#555555", "#999999"
 LEGEND = (
@@ -56,7 +56,7 @@ def _seen(points: Array | Iterable[Array], reach: float) -> Array:
     a, e = AZIMUTH, ELEVATION
     right = np.array([-np.sin(a), np.cos(a), 0.0])
     up = np.array([-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)])
-    flat = np.array(list(points)) @ np.stack([right, up], axis=1) * (0.36 * WIDE / reach)
+    flat = np.array(list(points)) @ np.stack([right, up], axis=1) * (0.34 * WIDE / reach)
     return flat * [1.0, -1.0] + [0.5 * WIDE, 0.5 * HIGH]
 
 
