@@ -15,7 +15,7 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
-LOCKS = {"dev": ("video", "test", "dev"), "bench": ("video", "test", "dev", "bench")}
+LOCKS = {"dev": ("video", "view", "test", "dev"), "bench": ("video", "view", "test", "dev", "bench")}
 
 
 def pins(lock: str) -> dict[str, list[tuple[Requirement, int]]]:

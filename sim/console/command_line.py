@@ -1,4 +1,7 @@
-"""The command line: `pivoting example | list | contacts | run | render`. Exit 0: pass, 1: fail, 2: one line of why."""
+"""The command line: `pivoting example | list | contacts | run | render | view`.
+
+Exit 0: pass, 1: fail, 2: one line of why.
+"""
 
 import os
 import sys
@@ -208,9 +211,7 @@ def render(
     from pivoting.sim.drawing.scene_video import render as write
     from pivoting.sim.simulation import simulate
 
-    if scenario is None and own["model"] is None:
-        raise click.UsageError("Missing argument 'SCENARIO', or --model FILE.xml --body NAME.")
-    scenario = scenario or "pivot"
+    scenario = _asked_name(scenario, own)
     asked = ask(scenario, None, worlds=1, seed=seed, settings=settings, limits=(), open_loop=False, **own)
     output = Output(out, _size(size), fps, speed, time)
     check_graphics()
@@ -220,6 +221,32 @@ def render(
         frames = write(finished, output, progress=report)
     told = f"{frames} frame{'s' * (frames > 1)} of a run of {finished.time[-1]:g} s, verdict: {finished.verdict}"
     click.echo(f"wrote {out}: {told}")
+    return 0
+
+
+@cli.command()
+@click.argument("scenario", required=False)
+@scenario_options
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the initial errors.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to serve on; 0.0.0.0: to everybody.")
+@click.option("--port", type=click.IntRange(0, 65535), default=8080, show_default=True, help="0: any that is free.")
+def view(scenario: str | None, settings: tuple[str, ...], seed: int, host: str, port: int, **own: Any) -> int:
+    """Run SCENARIO, or an object of your own, in real time on a page in the browser, until Ctrl-C.
+
+    There it can be shoved, sent to another angle, and changed while it runs; the page shows the forces, the verdict so
+    far, plots and the solution space. Needs viser: pip install 'pivoting[view]'. --set takes the keys of `pivoting
+    run`.
+    """
+    from pivoting.sim.console.asked_run import ask
+
+    asked = ask(
+        _asked_name(scenario, own), None, worlds=1, seed=seed, settings=settings, limits=(), open_loop=False, **own
+    )
+    if not _installed("viser"):
+        raise click.ClickException("view needs viser, which is not installed: pip install 'pivoting[view]'")
+    from pivoting.sim.viewing.live_page import view as serve
+
+    serve(asked.scenario, host, port, seed)
     return 0
 
 
@@ -240,6 +267,20 @@ def contacts(model: Path, body: str, support: str | None, least: float, as_json:
     else:
         print_contacts(console(), found)
     return 0
+
+
+def _asked_name(scenario: str | None, own: dict[str, Any]) -> str:
+    """The scenario's name, which may be left out for an object of one's own."""
+    if scenario is None and own["model"] is None:
+        raise click.UsageError("Missing argument 'SCENARIO', or --model FILE.xml --body NAME.")
+    return scenario or "pivot"
+
+
+def _installed(package: str) -> bool:
+    """Whether it could be imported; None in place of a module says that it cannot."""
+    from importlib.util import find_spec
+
+    return sys.modules.get(package, package) is not None and find_spec(package) is not None
 
 
 def _advised(advice: dict[str, Any]) -> str:

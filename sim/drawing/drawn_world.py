@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.solution import FAILED
+from pivoting.controller.solution_space import SolutionSpace, solution_space
 from pivoting.models.support_surfaces import upward
 from pivoting.sim.drawing.shapes import Solid, arcs, body_solids, cone
 from pivoting.sim.run import Run
@@ -91,11 +92,27 @@ class DrawnWorld:
     @cached_property
     def scale(self) -> float:
         """Length of a drawn force [m/N]: m g is half a side, or less if the run's forces would pass 0.8 sides."""
+        return 0.5 * self.side / max(float(np.linalg.norm(self.weight)), 0.625 * self.usual_force, 1e-9)
+
+    @property
+    def usual_force(self) -> float:
+        """What the drawn forces, and in space the moments as forces at `length`, usually stay below [N]."""
         wrench, i = self.run.wrench[self.world], self.dim
         drawn = [wrench[:, :i], *np.moveaxis(self.force, 1, 0)]
         drawn += [wrench[:, i:] / self.length] * (i == 3)
-        largest = max(usual(np.linalg.norm(each[: self.answers], axis=1)) for each in drawn)
-        return 0.5 * self.side / max(float(np.linalg.norm(self.weight)), 0.625 * largest, 1e-9)
+        return max(usual(np.linalg.norm(each[: self.answers], axis=1)) for each in drawn)
+
+    @property
+    def usual_moment(self) -> float:
+        """What the applied moments usually stay below [N m]."""
+        return usual(self._moments)
+
+    @property
+    def _moments(self) -> Array:
+        """(N,) applied moments [N m], in the plane with their sign."""
+        if self.dim == 2:
+            return self.run.wrench[self.world, : self.answers, 2]
+        return np.linalg.norm(self.run.wrench_world[self.world, : self.answers, 3:], axis=1)
 
     @property
     def away(self) -> Array:
@@ -181,14 +198,11 @@ class DrawnWorld:
         270 deg stand for what the moments usually stay below, or for a tenth of m g at the corner's lever if more.
         """
         if self.dim == 2:
-            moment = self.run.wrench[self.world, : self.answers, 2]
             plane = np.broadcast_to(self.run.table_axes[:, [0, 2]], (len(rows), 3, 2))
         else:
-            vectors = self.run.wrench_world[self.world, : self.answers, 3:]
-            moment = np.linalg.norm(vectors, axis=1)
-            plane = _planes_across(vectors)[rows]
-        full = max(usual(moment), 0.05 * self.side / self.scale * float(np.linalg.norm(self.run.points)))
-        sweep = np.deg2rad(np.clip(270.0 * moment[rows] / full, -330.0, 330.0))
+            plane = _planes_across(self.run.wrench_world[self.world, : self.answers, 3:])[rows]
+        full = max(self.usual_moment, 0.05 * self.side / self.scale * float(np.linalg.norm(self.run.points)))
+        sweep = np.deg2rad(np.clip(270.0 * self._moments[rows] / full, -330.0, 330.0))
         return arcs(sweep, 0.2 * self.side) @ np.swapaxes(plane, 1, 2)
 
     def measured(self, rows: Rows) -> Array:
@@ -198,6 +212,26 @@ class DrawnWorld:
     def predicted(self, rows: Rows) -> Array:
         """(R, K, 3) arrows of the predicted contact forces, nan without an answer, table axes [m]."""
         return self.scale * self._lifted(self.force[rows])
+
+    def solution_space(self, rows: Rows, reach: float) -> SolutionSpace:
+        """Of steps of a planar run, from the log alone: the pose at its start, what was required, what was applied.
+
+        Without an answer (nan) nothing was applied, and of the contact nothing is known.
+
+        Args:
+            reach: largest normal force that is drawn [N].
+        """
+        run, i, controller = self.run, self.world, self.run.attached.controller
+        unanswered = run.status[i, rows, None] == FAILED
+        return solution_space(
+            np.array([controller.jacobian(q) for q in run.quaternion[i, rows]]),
+            float(self.planned_mu[0]),
+            controller.contacts[0].f_min,
+            run.required[i, rows],
+            np.where(unanswered, 0.0, run.wrench[i, rows]),
+            self.force[rows, 0],
+            reach,
+        )
 
     def _lifted(self, force: Array) -> Array:
         """(R, K, 3) of forces (R, K, d)."""

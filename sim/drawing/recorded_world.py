@@ -6,8 +6,7 @@ from math import ceil
 from typing import Any
 
 import numpy as np
-from pivoting.controller.solution import FAILED
-from pivoting.controller.solution_space import SolutionSpace, solution_space
+from pivoting.controller.solution_space import SolutionSpace
 from pivoting.sim.drawing.colours import Colour
 from pivoting.sim.drawing.drawn_world import Array, DrawnWorld, Rows, usual
 
@@ -78,21 +77,8 @@ class Film(DrawnWorld):
 
     @cached_property
     def space(self) -> SolutionSpace:
-        """Of these steps, from the log alone: the pose that the controller saw, what was required, what was applied.
-
-        Without an answer (nan) nothing was applied, and of the contact nothing is known.
-        """
-        run, i, rows, controller = self.run, self.world, self.space_rows, self.run.attached.controller
-        unanswered = run.status[i, rows, None] == FAILED
-        return solution_space(
-            np.array([controller.jacobian(q) for q in run.quaternion[i, rows]]),
-            float(self.planned_mu[0]),
-            controller.contacts[0].f_min,
-            run.required[i, rows],
-            np.where(unanswered, 0.0, run.wrench[i, rows]),
-            self.force[rows, 0],
-            self.reach,
-        )
+        """Of these steps."""
+        return self.solution_space(self.space_rows, self.reach)
 
     @cached_property
     def reach(self) -> float:

@@ -1,0 +1,1 @@
+"""The closed loop live, on a page in the browser."""
