@@ -88,7 +88,11 @@ def for_worlds(beliefs: Sequence[Belief]) -> tuple[tuple[object, ...], ...]:
     first = beliefs[0]
     for i, other in enumerate(beliefs):
         if other.law != first.law or _kind(other) != _kind(first):
-            raise fail(f"controller[{i}]", "one of another law or other contacts", "as controller[0] but for numbers")
+            raise fail(
+                f"controller[{i}]",
+                "one of another law or other contacts",
+                "one that differs from controller[0] in numbers alone",
+            )
     stacked = (_stacked(parts) for parts in ([belief[part] for belief in beliefs] for part in range(3)))
     return (*stacked, first.law)
 

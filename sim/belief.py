@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
+import mujoco
 from pivoting.controller.validate import fail
 from pivoting.controller.wrench_controller import WrenchController
 from pivoting.models.friction_coefficient import read_friction
@@ -39,7 +40,9 @@ class Believed(NamedTuple):
         if len(self.controllers) == 1:
             return self
         some = slice(first, first + worlds)
-        return self._replace(stances=tuple(Stance(each.held, each.controllers[some]) for each in self.stances))
+        stances = tuple(Stance(each.held, each.controllers[some]) for each in self.stances)
+        attached = Attached(self.attached.model, self.attached.body, stances[0].controllers[0])
+        return self._replace(attached=attached, stances=stances)
 
 
 def believe(
@@ -86,19 +89,30 @@ def believe(
     attached = own(contacts=list(there.contacts), radius=there.radius)
     if case.landing == "ignored":
         return Believed(scene, attached, there, (Stance.of(K * [True], (attached.controller,)),))
-    if there.body.dim == 2 or there.radius.any() or not L:
-        raise fail("landing", "held", "ignored: this object has no other corners in space to land on")
+    if refused := _no_landing(case, scene.compiled, there):
+        raise fail("landing", "held", f"ignored: {refused}")
     landed = own(contacts=[*there.contacts, *there.landing]).controller
     on_contact = Stance.of(K * [True] + L * [False], (attached.controller,))
     return Believed(scene, attached, there, (on_contact, Stance.of((K + L) * [True], (landed,))))
+
+
+def _no_landing(case: Scenario, model: mujoco.MjModel, there: Placement) -> str:
+    """Why the object cannot be held on what it lands on; "" if it can."""
+    first, index = int(model.body_geomadr[there.body.index]), there.body.index
+    kinds = model.geom_type[first : first + int(model.body_geomnum[index])]
+    if there.body.dim == 2 or case.about != "tilt":
+        return "only what is tilted in space lands on a face"
+    if kinds.tolist() != [int(mujoco.mjtGeom.mjGEOM_BOX)] or len(there.landing) != 2:
+        return "of other objects than a single box, on an edge, it is not known that they touch at their corners alone"
+    return "" if case.limits.contacts_end else "nothing is to land without limit.contacts_end, the contacts at the end"
 
 
 def _given(given: WrenchController | Sequence[WrenchController] | None, worlds: int) -> tuple[WrenchController, ...]:
     """The controllers that were given; none, where the scenario's own is to be made."""
     if given is None:
         return ()
-    if not isinstance(given, Sequence):
-        return (given,)
+    if not isinstance(given, list | tuple):
+        return (given,)  # type: ignore[return-value]
     if len(given) != worlds:
         raise fail("controller", f"{len(given)} of them", f"one, or one for each of the {worlds} worlds")
     return tuple(given)

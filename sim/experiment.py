@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.units import lever
+from pivoting.controller.wrench_controller import WrenchController
 from pivoting.models.rigid_body import RigidBody
 from pivoting.sim.attachment import Attached
 from pivoting.sim.judging.measures import Measures
@@ -104,6 +105,11 @@ class Experiment:
         if "control" in self.python_objects:
             return "own control"
         return "given" if "controller" in self.python_objects else "scenario"
+
+    def controller_of(self, world: int, stance: int = 0) -> WrenchController:
+        """That of one world in one of its stances."""
+        controllers = self.stances[stance].controllers
+        return controllers[world % len(controllers)]
 
     @property
     def certified(self) -> bool:

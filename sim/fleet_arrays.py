@@ -4,7 +4,7 @@ Dimensions: world (W); sample (S), at `time`; plan (P), of a receding horizon; s
 their names end with; samples are in the model's unit of length, as in the file of a run.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -75,7 +75,7 @@ def fleet_of(
     arrays: Arrays,
     outcome: Mapping[str, Any],
     python_objects: tuple[str, ...],
-    controller: WrenchController | None,
+    controller: WrenchController | Sequence[WrenchController] | None,
 ) -> Fleet:
     """The fleet again.
 

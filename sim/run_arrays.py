@@ -43,7 +43,11 @@ _MEANINGS = {  # name: dimensions, unit, what it is
     "reference_rate": ("state", "rad/s", "desired rate of turn"),
     "reference_acceleration": ("state", "rad/s^2", "desired angular acceleration"),
     "theta": ("world state", "rad", "angle turned about the reference's axis"),
-    "slip": ("world state contact table_axis", "m", "displacement of the contacts along the table since the start"),
+    "slip": (
+        "world state contact table_axis",
+        "m",
+        "displacement of contacts along the table since they are to hold",
+    ),
     "position": ("world state xyz", "m", "centre of mass, world axes"),
     "quaternion": ("world state wxyz", "", "orientation, object axes to world"),
     "velocity": ("world state xyz", "m/s", "velocity of the centre of mass, world axes"),

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -92,7 +92,10 @@ def _different(a: Mapping[str, Any], b: Mapping[str, Any], but: tuple[str, ...])
 
 
 def load(
-    folder: str | os.PathLike[str], *, scenario: Scenario | None = None, controller: WrenchController | None = None
+    folder: str | os.PathLike[str],
+    *,
+    scenario: Scenario | None = None,
+    controller: WrenchController | Sequence[WrenchController] | None = None,
 ) -> Run | Fleet:
     """The run that `Run.save` or `pivoting run --out` kept: the same arrays bit for bit, measures and verdict.
 

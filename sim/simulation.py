@@ -30,7 +30,7 @@ from pivoting.sim.run_setup import Begun, set_up
 from pivoting.sim.scenario_control import Decided, decide, laws_of, stages_of
 from pivoting.sim.scenarios.scenario import Scenario
 from pivoting.sim.scenarios.shipped_scenarios import scenario
-from pivoting.sim.start_states import resting_depth, start_worlds
+from pivoting.sim.start_states import resting_depths, start_worlds
 
 Array = NDArray[np.float64]
 Controllers = WrenchController | Sequence[WrenchController] | None
@@ -100,7 +100,7 @@ def simulate(
     asked = (scenario(name) if isinstance(name, str) else name).change(**overrides)
     asked.refuse_without_effect(overrides, open_loop)
     if asked.landing == "held" and (controller is not None or control is not None):
-        if "landing" in overrides:
+        if "landing" in asked.given:
             raise fail("landing", "held", "left out: a controller or control of your own holds one set of contacts")
         asked = replace(asked, landing="ignored")
     one_of("keep", keep, tuple(KEEP))
@@ -139,12 +139,12 @@ def run_worlds(
 
 def start_batch(begun: Begun, decided: Decided) -> Batch:
     """The worlds where they start."""
-    world, attached = begun.world, begun.belief.attached
+    world, controllers = begun.world, begun.belief.controllers
     seed, worlds, first = begun.setting[:3]
     batch = Batch(world.model, worlds, nthread=1 if worlds == 1 else 0, persistent=True)
     errors = np.random.default_rng(seed).uniform(-1.0, 1.0, first + worlds)[first:]
-    depth = resting_depth(world, attached, decided.per_step, begun.told) if begun.case.chosen else 0.0
-    start_worlds(batch, world, begun.desired, np.deg2rad(begun.case.spread) * errors, depth)
+    depths = resting_depths(world, controllers, decided.per_step, begun.told) if begun.case.chosen else np.zeros(1)
+    start_worlds(batch, world, begun.desired, np.deg2rad(begun.case.spread) * errors, depths)
     return batch
 
 

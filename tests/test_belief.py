@@ -1,13 +1,18 @@
 """What controllers believe: apart by what changes apart, shared by the worlds or one for each of them."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from pivoting import load
 from pivoting.controller import Body, Contact, Law, Motion, WrenchController, solve
 from pivoting.controller.belief import for_worlds
 from pivoting.controller.planning.horizon import Horizon
 from pivoting.controller.rotations import rotation_matrix
-from pivoting.sim import simulate
+from pivoting.sim import Run, chunks, simulate
 from scipy.spatial.transform import Rotation
+
+from tests.own_files import mjcf, own
 
 CORNER = (-0.5, -0.5)
 
@@ -35,6 +40,27 @@ def test_a_controller_for_each_world_is_as_many_runs(name: str) -> None:
         assert np.array_equal(fleet.wrench[i], alone.wrench[0])
         assert np.array_equal(fleet.quaternion[i], alone.quaternion[0])
     assert not np.array_equal(fleet.wrench[0], fleet.wrench[1])
+
+
+def test_a_fleet_in_chunks_has_the_controller_of_each_world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each of them starts as deep in the table as its own controller lets it rest, and can be run again alone."""
+    monkeypatch.setattr(chunks, "CHUNK", 1)
+    case = own(tmp_path, mjcf())
+    first = simulate(case).attached.controller
+    controllers = [
+        WrenchController(Body(share * first.body.mass, first.body.inertia), first.contacts, first.law, first.gravity)
+        for share in (1.0, 1.15)
+    ]
+    run = simulate(case, worlds=2, controller=controllers)
+    fleet = simulate(case, worlds=2, controller=controllers, keep="measures")
+    for name, values in vars(run.measures).items():
+        assert np.array_equal(getattr(fleet.measures, name), values, equal_nan=True), name
+    assert np.array_equal(fleet.replay(1).position[0], run.position[1])
+    assert run.position[0, 0, 2] > run.position[1, 0, 2]  # the heavier one is believed to press it in
+    again = load(run.save(tmp_path / "kept"), controller=controllers)
+    assert isinstance(again, Run)
+    assert np.array_equal(again.wrench, run.wrench)
+    assert again.controller_of(1).body.mass == controllers[1].body.mass
 
 
 def test_beliefs_that_are_shared_are_stacked_once() -> None:

@@ -199,7 +199,7 @@ def test_a_controller_that_would_not_be_asked_is_refused(shipped: Callable[[str]
     class Heavier(WrenchController):
         @cached_property
         def belief(self) -> Belief:
-            return super().belief._replace(mass=1.2)
+            return super().belief._replace(object=super().belief.object._replace(mass=1.2))
 
     for kind, name in ((Mine, "problem"), (Turned, "jacobian")):
         with pytest.raises(

@@ -1,10 +1,13 @@
 """Stances: the block is held on an edge and, once it has landed, on its face, by one control for each."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 from pivoting import load
 from pivoting.controller import WrenchBounds
-from pivoting.sim import Run, simulate
+from pivoting.sim import Run, chunks, scenario, simulate
 from pivoting.sim.judging.measures import predicted_slip
 from pivoting.sim.pipeline.law_control import LawControl, LawSolver
 from pivoting.sim.pipeline.stages import Answers, States
@@ -54,7 +57,7 @@ def test_slip_is_counted_for_each_contact_while_it_is_to_hold(settled: Run) -> N
         first = int(settled.stance[world].argmax())
         assert not settled.slip[world, :first, FACE].any()
         own_path = settled.corner[world, first:, FACE, :2] - settled.corner[world, first, FACE, None, :2]
-        assert np.array_equal(settled.slip[world, first:, FACE], np.moveaxis(own_path, 0, 0))
+        assert np.array_equal(settled.slip[world, first:, FACE], own_path)
     assert np.array_equal(settled.slip[:, :, EDGE], path[:, :, EDGE])
     assert np.abs(settled.slip - predicted_slip(settled)).max() < 1e-9
     assert np.abs(settled.slip[:, :, FACE]).max() < 1e-8
@@ -97,7 +100,26 @@ def test_worlds_change_their_stance_apart(settled: Run) -> None:
     assert control.stance.T.tolist() == [[0, 1, 1, 1, 1, 1], [0, 0, 0, 1, 1, 1], [0, 0, 0, 0, 0, 0]]
 
 
-def test_a_run_of_stances_is_kept(settled: Run, tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_a_table_on_four_legs_is_refused(tmp_path: Path) -> None:
+    """Tilted, it stands on two of them, at four corners: to count contacts tells of no landing."""
+    legs = "".join(
+        f'<geom type="box" size=".01 .01 .05" pos="{x} {y} -.05"/>' for x in (-0.1, 0.1) for y in (-0.1, 0.1)
+    )
+    text = mjcf('<geom type="box" size=".12 .12 .01" pos="0 0 .01"/>' + legs, pose='pos="0 0 .1"')
+    case = own(tmp_path, text).change(landing="held", theta=15.0, theta_end=0.0, limits={"contacts_end": 4})
+    with pytest.raises(ValueError, match="must be ignored: of other objects than a single box"):
+        simulate(case)
+
+
+def test_a_fleet_of_stances_does_not_depend_on_its_chunks(settled: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chunks, "CHUNK", 1)
+    fleet = simulate("settle-3d", worlds=2, seed=3, spread=0.2, keep="measures")
+    for name, values in vars(settled.measures).items():
+        assert np.array_equal(getattr(fleet.measures, name), values), name
+    assert fleet.replay(1).stance is not None
+
+
+def test_a_run_of_stances_is_kept(settled: Run, tmp_path: Path) -> None:
     again = load(settled.save(tmp_path))
     assert settled.stance is not None
     assert np.array_equal(again.stance, settled.stance)
@@ -105,7 +127,7 @@ def test_a_run_of_stances_is_kept(settled: Run, tmp_path) -> None:  # type: igno
     assert again.verdict == settled.verdict
 
 
-def test_a_box_of_ones_own_is_set_down_and_held(tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_a_box_of_ones_own_is_set_down_and_held(tmp_path: Path) -> None:
     case = own(tmp_path, mjcf()).change(
         landing="held", theta=15.0, theta_end=0.0, seconds=1.0, limits={"contacts_end": 4}
     )
@@ -126,8 +148,15 @@ def test_a_controller_that_is_given_has_the_stance_that_it_is_made_for() -> None
 @pytest.mark.parametrize(
     ("case", "keys", "message"),
     [
-        ("pivot-2d", {}, "landing = 'held': must be ignored: this object has no other corners in space to land on"),
-        ("mpc-3d", {}, "landing = 'held': must be ignored with a plan"),
+        ("pivot-2d", {}, "landing = 'held': must be ignored: only what is tilted in space lands on a face"),
+        ("spin-3d", {}, "landing = 'held': must be ignored: only what is tilted in space lands on a face"),
+        ("pivot-3d", {}, "landing = 'held': must be ignored: nothing is to land without limit.contacts_end"),
+        (
+            "pivot-3d",
+            {"limits": {"contacts_end": 4}, "contact": "vertex"},
+            "of other objects than a single box, on an edge",
+        ),
+        ("settle-3d", {"plan_hz": 100}, "landing = 'held': must be ignored with a plan"),
         ("settle-3d", {"integral": 2.0}, "landing = 'held': must be ignored with a plan or integral action"),
         (
             "settle-3d",
@@ -143,6 +172,8 @@ def test_a_controller_that_is_given_has_the_stance_that_it_is_made_for() -> None
     ],
 )
 def test_what_knows_one_stance_is_refused(case: str | Scenario, keys: dict, message: str) -> None:
+    if contact := keys.pop("contact", None):
+        case = replace(scenario(str(case)), contact=contact)
     if keys.get("controller") == "given":
         keys = {"controller": simulate("settle-3d", seconds=0.3).attached.controller}
     with pytest.raises(ValueError, match=message):

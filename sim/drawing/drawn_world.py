@@ -86,7 +86,7 @@ class DrawnWorld:
     @property
     def length(self) -> float:
         """What Q_w weighs a moment with: it weighs M / length as it does a force [m]."""
-        Q_w = self.run.attached.controller.Q_w
+        Q_w = self.run.controller_of(self.world).Q_w
         return float(np.sqrt(Q_w[0, 0] / Q_w[self.dim, self.dim]))
 
     @cached_property
@@ -148,7 +148,7 @@ class DrawnWorld:
     @property
     def planned_mu(self) -> Array:
         """(K,) friction that the controller may use, (1 - margin) mu."""
-        return self.run.stances[-1].controllers[0].belief.contacts.mu
+        return self.run.controller_of(self.world, -1).belief.contacts.mu
 
     @cached_property
     def corner(self) -> Array:
@@ -221,7 +221,7 @@ class DrawnWorld:
         Args:
             reach: largest normal force that is drawn [N].
         """
-        run, i, controller = self.run, self.world, self.run.attached.controller
+        run, i, controller = self.run, self.world, self.run.controller_of(self.world)
         unanswered = run.status[i, rows, None] == FAILED
         return solution_space(
             np.array([controller.jacobian(q) for q in run.quaternion[i, rows]]),
@@ -241,7 +241,7 @@ class DrawnWorld:
     def cone(self, i: int, *, planned: bool) -> tuple[Array, NDArray[np.int64], list[Array]]:
         """The friction cone of contact i, planned or the world's, in table axes [m]; see `shapes.cone`."""
         mu = float(self.planned_mu[i]) if planned else self.run.world.mu
-        floor = self.scale * self.run.stances[-1].controllers[0].contacts[i].f_min
+        floor = self.scale * self.run.controller_of(self.world, -1).contacts[i].f_min
         tall = 0.8 if self.dim == 2 else 0.45
         return cone(mu, floor * planned, max(tall * self.side / np.hypot(mu, 1.0), 1.3 * floor), self.dim)
 

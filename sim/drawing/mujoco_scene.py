@@ -167,7 +167,9 @@ def _draw_contacts(scene: mujoco.MjvScene, film: DrawnWorld, row: Rows) -> None:
     """The measured force at each contact, and the friction cone that the controller stays within."""
     axes = film.run.table_axes
     measured = film.measured(row)[0] @ axes.T
-    for k, at in enumerate(film.corner[row[0]] + film.front):
+    standing = film.run.standing[film.world, row[0]]
+    for k in map(int, np.flatnonzero(standing)):
+        at = film.corner[row[0], k] + film.front
         vertices, triangles, lines = film.cone(k, planned=True)
         corners = vertices @ axes.T
         if film.dim == 3:

@@ -82,7 +82,8 @@ class _Case:
     @property
     def least_push(self) -> float:
         """[N] the least normal force of a contact that the answers count on."""
-        return self.run.unit * float(np.nanmin(self.run.force[self.world, :, :, -1], initial=np.inf))
+        push = np.where(self.run.standing[self.world], self.run.force[self.world, :, :, -1], np.nan)
+        return self.run.unit * float(np.nanmin(push, initial=np.inf))
 
     @property
     def weight(self) -> float:
@@ -92,7 +93,7 @@ class _Case:
     @property
     def mu(self) -> float:
         """As believed, without the margin."""
-        return max(contact.mu for contact in self.run.attached.controller.contacts)
+        return max(contact.mu for contact in self.run.controller_of(self.world).contacts)
 
 
 def reasons(run: "Run", strays: list[str] | None = None) -> list[str]:
@@ -202,10 +203,10 @@ def _pressed(case: _Case, spare: Mapping[str, float]) -> Iterator[Remedy]:
 def _floors(case: _Case) -> Iterator[float]:
     """[N] floors of each contact, the least first: against opening by turning, errors of the force, and by weight."""
     run, i = case.run, case.world
-    K = len(run.points)
+    K, belief = int(np.count_nonzero(run.stances[0].held)), run.controller_of(i).belief
     off = np.linalg.norm(run.force_measured[i] - run.force[i], axis=-1)
     error = run.unit * float(np.quantile(np.nan_to_num(off), 0.95))
-    spare = max(run.world.mu - float(np.max(run.attached.controller.belief.contacts.mu)), 0.1 * run.world.mu)
+    spare = max(run.world.mu - float(np.max(belief.contacts.mu)), 0.1 * run.world.mu)
     some = {0.5 * case.weight / K, 2.0 * case.weight / K, 5.0 * case.weight / K}
     rows = run.world.contact_rows
     most = 20.0 * case.weight
@@ -216,7 +217,7 @@ def _floors(case: _Case) -> Iterator[float]:
         opening = c_n * max(1.0 - 0.5 * rows.b * rows.h, 0.0) / rows.regularisation * rows.points / K
         some |= {2.0 * run.unit * opening}
     some |= {1.5 * error * (1.0 + run.world.mu) / spare}
-    least = max(1.2 * run.unit * float(run.attached.controller.belief.contacts.f_min.min()), 0.05 * case.weight / K)
+    least = max(1.2 * run.unit * float(belief.contacts.f_min.min()), 0.05 * case.weight / K)
     yield from sorted({_up(floor) for floor in some if least < floor < most})
 
 

@@ -23,7 +23,7 @@ class Measures:
     In the unit that the name ends with, whatever the model's unit of length is.
 
     Attributes:
-        slip_max_m: greatest displacement of a contact along the table from where it started, less what it rolled.
+        slip_max_m: greatest displacement of a contact along the table since it is to hold, less what it rolled.
         slip_floor_m: what the simulator's creep, rotation and penetration terms predict for it, see
             `predicted_slip.drift`; nan where they cannot, see `slip_floor_unknown`.
         angle_error_rms_deg, angle_error_max_deg: orientation against the reference.
@@ -59,15 +59,11 @@ def measure(run: "ContactMotion") -> Measures:
     settled = run.time >= run.scenario.limits.settle_s - 1e-12
     error = np.rad2deg(run.angle_error[:, settled])
     steps = settled[:-1]
-    # a body that has landed shares the load among contacts that the controller does not count
-    counted = steps & ~(run.landed.any(axis=0) if run.scenario.limits.contacts_end else np.zeros_like(steps))
-    measured, predicted = run.force_measured[:, counted], run.force[:, counted]
     use = run.friction_use[:, steps]
     pushed = ~np.isnan(use)
     began = np.maximum(run.when_held(run.corner)[..., 2], 0.0)  # one with a margin is held above the table
     risen = (run.corner[..., 2] - began > LIFTED * run.size)[:, 1:] & run.standing
     lost = ~pushed.any(axis=2) | risen[:, steps].any(axis=2)
-    mismatch = _rms(np.linalg.norm(measured - predicted, axis=-1)) / _rms(np.linalg.norm(predicted, axis=-1))
     ever = pushed.any(axis=(1, 2))
     return Measures(
         slip_max_m=run.unit * np.linalg.norm(run.slip, axis=-1).max(axis=(1, 2)),
@@ -80,10 +76,23 @@ def measure(run: "ContactMotion") -> Measures:
         contacts_missing=np.maximum(run.scenario.limits.contacts_end - run.contacts_found[:, -1], 0.0),
         bounce_m=run.unit * _bounce(run),
         friction_use_max=np.where(ever, np.where(pushed, use, 0.0).max(axis=(1, 2)), np.nan),
-        force_mismatch_rel=mismatch,
+        force_mismatch_rel=_mismatch(run, steps),
         residual_max=np.where(np.isfinite(run.residual), run.residual, np.inf).max(axis=1),
         unsolved_steps=np.isin(run.status, (INACCURATE, FAILED)).sum(axis=1).astype(float),
     )
+
+
+def _mismatch(run: "ContactMotion", steps: NDArray[np.bool_]) -> Array:
+    """(W,) RMS of measured less predicted contact force over that of the predicted, over these steps (N,).
+
+    But for those in which a body has landed on contacts that no stance holds: it shares the load with them.
+    """
+    off = np.linalg.norm(run.force_measured - run.force, axis=-1)
+    size = np.linalg.norm(run.force, axis=-1)
+    if not run.scenario.limits.contacts_end or run.stance is not None:
+        return _rms(off[:, steps]) / _rms(size[:, steps])
+    each = [steps & ~landed for landed in run.landed]
+    return np.array([_rms(off[i : i + 1, own])[0] / _rms(size[i : i + 1, own])[0] for i, own in enumerate(each)])
 
 
 def _penetration(run: "ContactMotion") -> Array:
@@ -122,8 +131,8 @@ def _held(run: "ContactMotion") -> RowEffects:
     held = run.log.held
     if run.stance is None:
         return held
-    give, slides = np.where(run.standing[..., None], held.give, 0.0), held.slides & run.standing
-    return held._replace(give=give, slides=slides)
+    give = np.where(run.standing[..., None], held.give, held.give[..., :1, :])  # the first is held in every stance
+    return held._replace(give=give, slides=held.slides & run.standing)
 
 
 def slip_floor_unknown(run: "ContactMotion", first: int = 0, of: int | None = None) -> str:

@@ -60,9 +60,9 @@ def summary(run: "Experiment") -> dict[str, Any]:
 
 
 def _in_file(run: "Experiment") -> Array:
-    """(K, 3) the contacts as --contact takes them, in the frame and unit of length that the file gives the body."""
+    """The first stance's contacts as --contact takes them, in the frame and unit of length of the body in its file."""
     origin, axes = file_frame(run.model, run.truth.index)
-    return (run.truth.com + run.points @ matrix(run.truth.axes).T - origin) @ axes
+    return (run.truth.com + run.points[run.stances[0].held] @ matrix(run.truth.axes).T - origin) @ axes
 
 
 def object_figures(run: "Experiment") -> dict[str, Any]:

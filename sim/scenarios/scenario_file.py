@@ -149,6 +149,8 @@ def _check(said: Any) -> None:
         if type(value) not in _ENTRIES[name]:
             allowed = " or ".join(_KINDS[kind] for kind in _ENTRIES[name])
             raise InputError(f"{name} = {json.dumps(value)}: must be {allowed}")
+    if not all(isinstance(name, str) for name in said.get("python_objects", ())):
+        raise InputError(f"python_objects = {json.dumps(said['python_objects'])}: must be a list of names")
     one_of("keep", said.get("keep", "all"), tuple(KEEP))
 
 

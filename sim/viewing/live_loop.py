@@ -4,6 +4,7 @@ It goes on in laps. Each is a run like one of `simulate`, of the same stages, lo
 begins with the state in which the one before ended.
 """
 
+from dataclasses import replace
 from math import ceil, inf, isfinite
 from time import perf_counter
 from typing import Any
@@ -62,6 +63,7 @@ class LiveLoop:
         asked.refuse_without_effect(asked.given, open_loop=False)
         if asked.landing == "held":  # a lap that goes on for as long as one likes is of one stance
             asked = asked.change(landing="ignored")
+            self.notes.append("The page runs laps of one stance: landing=ignored.")
         whole = set_up(asked, None, worlds=1, seed=self._seed, first_world=0)
         stages = stages_of(whole)
         laws = laws_of(whole, stages)
@@ -86,6 +88,7 @@ class LiveLoop:
         case = self._whole.case
         ends = isfinite(getattr(case.motion, "duration", inf))
         self.laps_left: float = ceil(case.duration / LONGEST) if ends else inf
+        self._ends = self.laps_left == 1
         self._begin(case.motion, case.duration / self.laps_left if ends else min(case.duration, LONGEST))
 
     def _begin(self, reference: Reference, seconds: float) -> None:
@@ -187,6 +190,7 @@ class LiveLoop:
         angle, rate, _ = self._whole.reference
         closed = max(abs(angle[-1] - angle[0]), abs(rate[0]), abs(rate[-1])) < STILL
         self.laps_left -= 1
+        self._ends = self.laps_left == 1
         again = "" if closed or self.laps_left > 0 else " The object was put back to its start."
         self.notes.append(f"Lap {self.lap} of {self.seconds:g} s: {verdict}.{again}")
         if self.laps_left > 0:
@@ -202,7 +206,11 @@ class LiveLoop:
         Slip counts from its first step on.
         """
         states, last = slice(first, self.made + 1), self.made
+        asked = self._begun.asked
+        if not self._ends:  # only the last lap of the scenario's own motion ends on what is to be landed on
+            asked = replace(asked, limits=replace(asked.limits, contacts_end=0))
         begun = self._begun._replace(
+            asked=asked,
             time=self._begun.time[states],
             reference=_cut(self._begun.reference, states),
             desired=_cut(self._begun.desired, states),
@@ -221,7 +229,7 @@ class LiveLoop:
             raise fail("theta", theta, f"in [{low:.4g}, {high:.4g}] deg")
         natural = self._whole.belief.placement.load.time
         seconds = MOVE * natural if isfinite(natural) else 0.1 * LONGEST
-        self.laps_left = inf
+        self.laps_left, self._ends = inf, False
         now = from_now(self._reference, self.time)
         self._begin(Redirected(now, float(np.deg2rad(theta)), seconds), max(0.5 * LONGEST, 2.0 * seconds))
 
@@ -231,6 +239,7 @@ class LiveLoop:
         Raises:
             ValueError, ModelError: all is as it was before.
         """
+        time = self.time
         self._set(self.asked.change(**keys))
         angle = np.rad2deg(self.run(self.made - 1).theta[0, -1]) if self.made else None
         batch = Batch(self._whole.world.model, 1, nthread=1, persistent=True)
@@ -240,7 +249,7 @@ class LiveLoop:
             return
         batch.state[:] = self._batch.state
         self._on(batch)
-        self._begin(from_now(self._reference, self.time), self.seconds - self.time)
+        self._begin(from_now(self._reference, time), max(self.seconds - time, 0.0))
 
     def shove(self, impulse: Array, at: Array | None = None) -> None:
         """Push the object for an instant, in the world alone: the controller sees only what comes of it.
