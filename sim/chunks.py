@@ -1,7 +1,8 @@
 """Many worlds, run in chunks: of each only what the policy says is kept, so that the memory is bounded."""
 
-from collections.abc import Callable, Sequence
-from contextlib import nullcontext
+import ctypes
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from typing import Any
 
@@ -37,6 +38,7 @@ def run_in_chunks(begun: Begun, handed: Handed, keep: str, progress: Report | No
         for first in range(0, worlds, size):
             part = begun.part(first, min(size, worlds - first))
             kept.add(run_worlds(part, handed, _report(progress, part, first, worlds * steps), nullcontext([])), first)
+            _give_back()
     fleet = kept.fleet(begun, handed, tuple(warned))
     if not fleet.failed_worlds.size:
         return fleet
@@ -45,6 +47,12 @@ def run_in_chunks(begun: Begun, handed: Handed, keep: str, progress: Report | No
         reasons=reasons(worst, fleet.strays), remedies=[each.setting for each in remedies(worst)]
     )
     return replace(fleet, findings=found)
+
+
+def _give_back() -> None:
+    """Have glibc return what a chunk has freed: it keeps it in pieces that the next may not fit into, ever more."""
+    with suppress(AttributeError, OSError, TypeError):  # another C library, which has no such function
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _report(progress: Report | None, part: Begun, first: int, of: int) -> Report | None:
@@ -59,9 +67,7 @@ class _Kept:
 
     def __init__(self, worlds: int, steps: int, reduced: bool):
         self._worlds, self._reduced = worlds, reduced
-        self._measures: list[tuple[Any, ...]] = []
-        self._samples: list[WorldSamples] = []
-        self._plans: list[PlanLog] = []
+        self._arrays: dict[type, dict[str, Any]] = {Measures: {}, WorldSamples: {}, PlanLog: {}}  # by name
         self._control_ns, self._wall_s = np.zeros(steps), 0.0
         self._events: list[Event] = []
         self._left_out = self._most_strayed = 0
@@ -69,11 +75,11 @@ class _Kept:
 
     def add(self, run: Run, first: int) -> None:
         """Keep what is to be kept of a chunk whose first world has this index in the fleet."""
-        self._measures.append(tuple(vars(run.measures).values()))
+        self._write(Measures, vars(run.measures), first)
         if self._reduced:
-            self._samples.append(samples(run))
+            self._write(WorldSamples, samples(run)._asdict(), first, "time")
         if run.plans is not None:
-            self._plans.append(run.plans)
+            self._write(PlanLog, run.plans._asdict(), first, "step")
         self._control_ns += run.log.control_ns
         self._wall_s += run.wall_s
         events = [event._replace(world=first + event.world) for event in run.events]
@@ -81,6 +87,21 @@ class _Kept:
         self._left_out += len(self._events[EVENTS:])
         del self._events[EVENTS:]
         self._find(run, first)
+
+    def _write(self, kind: type, values: Mapping[str, Any], first: int, shared: str = "") -> None:
+        """Write arrays (chunk, ...) into those of all worlds, which are there from the first chunk on.
+
+        Args:
+            shared: name of an array that is the same in all chunks.
+        """
+        kept = self._arrays[kind]
+        for name, part in values.items():
+            if name == shared:
+                kept[name] = part
+            else:
+                if name not in kept:
+                    kept[name] = np.empty((self._worlds, *part.shape[1:]), part.dtype)
+                kept[name][first : first + len(part)] = part
 
     def _find(self, run: Run, first: int) -> None:
         """What there is to say of the chunk, as of a run of all worlds."""
@@ -94,8 +115,7 @@ class _Kept:
 
     def fleet(self, begun: Begun, handed: Handed, warned: tuple[str, ...]) -> Fleet:
         """The fleet, without why it failed."""
-        plans = self._plans[0]._replace(**_joined(self._plans, "step")) if self._plans else None
-        sampled = self._samples[0]._replace(**_joined(self._samples, "time")) if self._samples else None
+        sampled, plans = self._arrays[WorldSamples], self._arrays[PlanLog]
         fleet = Fleet(
             scenario=begun.asked,
             seed=begun.setting.seed,
@@ -107,12 +127,12 @@ class _Kept:
             time=begun.time,
             reference=begun.reference,
             wall_s=self._wall_s,
-            plans=plans,
+            plans=PlanLog(**plans) if plans else None,
             events=tuple(self._events),
             engine_warnings=(*begun.world.warned, *warned),
             python_objects=handed.names,
-            measures=Measures(*map(np.concatenate, zip(*self._measures, strict=True))),
-            samples=sampled,
+            measures=Measures(**self._arrays[Measures]),
+            samples=WorldSamples(**sampled) if sampled else None,
             findings=self._found,
             control_us=self._control_ns / (1e3 * self._worlds),
             events_left_out=self._left_out,
@@ -120,12 +140,6 @@ class _Kept:
         )
         freeze(tuple(vars(fleet).values()))
         return fleet
-
-
-def _joined(parts: Sequence[Any], shared: str) -> dict[str, Any]:
-    """The arrays (W, ...) of all parts one after the other, by name; but for one that all of them share."""
-    names = [name for name in parts[0]._fields if name != shared]
-    return {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
 
 
 def samples(run: Run) -> WorldSamples:

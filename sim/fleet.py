@@ -127,7 +127,7 @@ class Fleet(Experiment):
         if isinstance(world, bool) or not isinstance(world, int | np.integer) or not 0 <= world < self.worlds:
             raise fail("world", world, f"a whole number in [0, {self.worlds})")
         if lost := [name for name in self.python_objects if name not in self.handed.names]:
-            raise InputError(f"fleet: its {' and '.join(lost)} were Python objects, which no file holds")
+            raise InputError(f"fleet: Python objects, which no file holds, were its {' and '.join(lost)}")
         first, handed = self.first_world + int(world), self.handed.of(int(world))
         run = simulate(self.scenario, 1, self.seed, first_world=first, **handed._asdict())
         for name, values in vars(self.measures).items():

@@ -198,7 +198,7 @@ def test_without_its_control_no_world_can_be_run_again(tmp_path: Path) -> None:
     made = simulate("balance-2d", 2, control=Unsteady(True), seconds=0.6, keep="measures")
     again = load(made.save(tmp_path))
     assert again.verdict == made.verdict
-    with pytest.raises(ValueError, match="fleet: its control were Python objects"):
+    with pytest.raises(ValueError, match="fleet: Python objects, which no file holds, were its control"):
         again.replay(0)
 
 
