@@ -91,7 +91,7 @@ def for_worlds(beliefs: Sequence[Belief]) -> tuple[tuple[object, ...], ...]:
             raise fail(
                 f"controller[{i}]",
                 "one of another law or other contacts",
-                "one that differs from controller[0] in numbers alone",
+                "one with the law of controller[0], and as many contacts of the same kind",
             )
     stacked = (_stacked(parts) for parts in ([belief[part] for belief in beliefs] for part in range(3)))
     return (*stacked, first.law)

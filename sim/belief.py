@@ -6,6 +6,7 @@ from functools import partial
 from typing import NamedTuple
 
 import mujoco
+import numpy as np
 from pivoting.controller.validate import fail
 from pivoting.controller.wrench_controller import WrenchController
 from pivoting.models.friction_coefficient import read_friction
@@ -14,8 +15,8 @@ from pivoting.models.scenes import Scene
 from pivoting.sim.attachment import Attached, attach
 from pivoting.sim.pace import closing_force
 from pivoting.sim.placement import Placement, placed
-from pivoting.sim.scenarios.scenario import Scenario
-from pivoting.sim.scenarios.scenario_keys import CONTROL_KEYS
+from pivoting.sim.scenarios.scenario import PACE, Scenario
+from pivoting.sim.scenarios.scenario_keys import CONTROL_KEYS, LOWEST
 from pivoting.sim.stances import Stance
 
 
@@ -104,7 +105,16 @@ def _no_landing(case: Scenario, model: mujoco.MjModel, there: Placement) -> str:
         return "only what is tilted in space lands on a face"
     if kinds.tolist() != [int(mujoco.mjtGeom.mjGEOM_BOX)] or len(there.landing) != 2:
         return "of other objects than a single box, on an edge, it is not known that they touch at their corners alone"
-    return "" if case.limits.contacts_end else "nothing is to land without limit.contacts_end, the contacts at the end"
+    if not case.limits.contacts_end:
+        return "nothing is to land without limit.contacts_end, the contacts at the end"
+    whole = case.absolute(there.load)
+    angle = whole.samples(np.linspace(0.0, whole.duration, PACE))[0]
+    lowest = int(angle.argmin())
+    if angle[-1] > np.deg2rad(LOWEST) or np.ptp(angle[lowest:]) > np.deg2rad(LOWEST):
+        return f"the reference {whole.reference} does not set it down and leave it there, as arc to theta_end=0 does"
+    if whole.force_rate is not None or whole.moment_rate is not None:
+        return "a bound on a rate does not let the wrench change as the contacts do"
+    return ""
 
 
 def _given(given: WrenchController | Sequence[WrenchController] | None, worlds: int) -> tuple[WrenchController, ...]:
@@ -128,7 +138,7 @@ def _floor(case: Scenario, there: Placement) -> float:
 def _check(controller: WrenchController, case: Scenario, there: Placement) -> None:
     """Refuse a controller that is not for these contacts, or that the loop would not ask."""
     if not isinstance(controller, WrenchController):
-        raise fail("controller", controller, "a WrenchController")
+        raise fail("controller", controller, "a WrenchController, or a list of one for each world")
     if [contact.dim for contact in controller.contacts] != [there.body.dim] * len(there.contacts):
         kind = "planar" if there.body.dim == 2 else "spatial"
         given = f"one with {len(controller.contacts)} contacts in dimension {controller.space.dim}"

@@ -21,6 +21,7 @@ from pivoting.sim.start_states import Samples
 from pivoting.sim.world import World, build_world
 
 Array = NDArray[np.float64]
+MOST = 10**15  # worlds, and their numbers: more than can be run
 MAX_STEPS = 10_000_000  # worlds times steps that are kept in memory, about 0.5 kB each
 
 
@@ -72,6 +73,8 @@ def set_up(
     for key, value, least in (("worlds", worlds, 1), ("seed", seed, 0), ("first_world", first_world, 0)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
             raise fail(key, value, f"a whole number >= {least}")
+        if key != "seed" and value >= MOST:
+            raise fail(key, value, f"a whole number < {MOST:g}")
     scene = load(asked.path, body=asked.body, support=asked.support, chosen=asked.chosen)
     belief = believe(asked, scene, int(worlds), controller)
     case = asked.absolute(belief.placement.load)

@@ -142,7 +142,8 @@ def start_batch(begun: Begun, decided: Decided) -> Batch:
     world, controllers = begun.world, begun.belief.controllers
     seed, worlds, first = begun.setting[:3]
     batch = Batch(world.model, worlds, nthread=1 if worlds == 1 else 0, persistent=True)
-    errors = np.random.default_rng(seed).uniform(-1.0, 1.0, first + worlds)[first:]
+    draws = np.random.Generator(np.random.PCG64(seed).advance(first))  # a number for each world
+    errors = draws.uniform(-1.0, 1.0, worlds)
     depths = resting_depths(world, controllers, decided.per_step, begun.told) if begun.case.chosen else np.zeros(1)
     start_worlds(batch, world, begun.desired, np.deg2rad(begun.case.spread) * errors, depths)
     return batch

@@ -76,7 +76,7 @@ def test_beliefs_that_are_shared_are_stacked_once() -> None:
     ("controllers", "message"),
     [
         ([believing(1.0)], r"^controller = '1 of them': must be one, or one for each of the 2 worlds$"),
-        ([believing(1.0), "mine"], r"^controller = 'mine': must be a WrenchController$"),
+        ([believing(1.0), "mine"], r"^controller = 'mine': must be a WrenchController, or a list"),
         ([believing(1.0), believing(1.0, law=Law.static())], r"^controller\[1\] = 'one of another law"),
     ],
 )

@@ -269,13 +269,14 @@ def browser(page: LivePage) -> Iterator[tuple[Any, list[str]]]:
         tab.on("pageerror", lambda error: wrong.append(str(error)))
         tab.on("request", lambda request: wrong.extend(() if LOCAL.match(request.url) else (request.url[:99],)))
         tab.goto(page.url)
-        tab.wait_for_selector("canvas")
+        tab.set_default_timeout(90_000.0)  # of a machine that is busy with other tests
         tab.wait_for_selector("#verdict")
+        tab.wait_for_selector("canvas")
         yield tab, wrong
         chromium.close()
 
 
-def until(seen: Callable[[], object], seconds: float = 15.0) -> None:
+def until(seen: Callable[[], object], seconds: float = 60.0) -> None:
     limit = monotonic() + seconds
     while not seen():
         assert monotonic() < limit
@@ -301,7 +302,7 @@ def picture(tab: Any) -> np.ndarray:
 def test_the_page_shows_the_scene_the_verdict_and_the_plots(browser: tuple[Any, list[str]]) -> None:
     tab, wrong = browser
     shown: list[np.ndarray] = []
-    until(lambda: shown.append(picture(tab)) or (shown[-1].astype(int) @ [-1, 0, 1] > 40).mean() > 0.02, 30.0)  # blue
+    until(lambda: shown.append(picture(tab)) or (shown[-1].astype(int) @ [-1, 0, 1] > 40).mean() > 0.02)  # blue
     assert "PASS" in tab.locator("#verdict").inner_text() or "SETTLING" in tab.locator("#verdict").inner_text()
     assert tab.locator(".uplot").count() == 4
     assert tab.locator("svg polygon").count() >= 2, "the solution space"
@@ -332,7 +333,7 @@ def test_the_button_and_a_click_shove_it(page: LivePage, browser: tuple[Any, lis
     ):
         until(lambda: np.abs(errors()).max() < 1e-3)
         act()
-        until(lambda: np.abs(errors()).max() > 0.02, 5.0)
+        until(lambda: np.abs(errors()).max() > 0.02, 20.0)
 
 
 def test_a_value_that_cannot_be_is_refused_on_the_page(page: LivePage, browser: tuple[Any, list[str]]) -> None:

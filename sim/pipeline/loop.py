@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.kernels.compilation import first_calls
 from pivoting.controller.kernels.compiled_step import STATE
+from pivoting.controller.validate import fail
 from pivoting.sim.pipeline.apply_wrench import FreeWrench
 from pivoting.sim.pipeline.contact_log import BLOCK, ContactLog
 from pivoting.sim.pipeline.log import Log, empty_log, worlds_first
@@ -109,6 +110,8 @@ def _seen(k: int, states: States, before: Array | None, stages: Stages, log: Log
         log.measured[k] = states.values
     for observe in stages.observe:
         states = observe(k, states, before)
+        if not isinstance(states, States):
+            raise fail("observe", type(states).__name__, "a function that returns States, as states.changed(...) makes")
     if log.estimated is not None:
         log.estimated[k] = states.values
     return states
