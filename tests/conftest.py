@@ -44,3 +44,11 @@ def random_problem(rng: np.random.Generator) -> WrenchProblem:
         Q_w=random_weight(rng, 3),
         Q_f=random_weight(rng, 2),
     )
+
+
+LONG = ("test_wheel", "test_kernel", "test_scenario_file", "test_fleet", "test_cones", "test_view")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The files that take longest come first, so that no worker is left alone with one of them at the end."""
+    items.sort(key=lambda item: item.path.stem not in LONG)

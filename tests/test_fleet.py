@@ -262,7 +262,7 @@ def test_on_the_command_line(tmp_path: Path) -> None:
 MEMORY = """
 import resource, sys
 from pivoting import simulate
-for worlds in (200, 800):
+for worlds in (150, 450):
     simulate("pivot-2d", worlds, seconds=0.5, keep="measures")
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
@@ -270,7 +270,7 @@ for worlds in (200, 800):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="has no getrusage")
 def test_memory_does_not_grow_with_the_worlds() -> None:
-    """600 worlds more, of 1750 steps, would take 1000 MB where all is kept."""
+    """300 worlds more, of 1750 steps, would take 500 MB where all is kept."""
     done = subprocess.run([sys.executable, "-c", MEMORY], capture_output=True, text=True, timeout=300, check=True)
     few, many = (int(line) / (1024 if sys.platform == "linux" else 1024**2) for line in done.stdout.split())
     grown = many - few
