@@ -112,7 +112,7 @@ class DrakeWorld:
         twist = self._block.EvalSpatialVelocityInWorld(self._context)
         turned = quaternion_product(quaternion(pose.rotation().matrix()), self._body.axes)
         values = np.concatenate([pose.translation(), turned, twist.translational(), twist.rotational()])
-        return States(values[None], np.zeros((1, 0)), np.zeros((1, 0)))
+        return States(values[None], np.zeros((1, 0)), np.zeros((1, 0)), np.zeros(1))
 
     def step(self, wrench: Array) -> Array:
         """Make one time step; returns the force (3,) of all contacts on the block during the step, world axes [N].

@@ -17,15 +17,13 @@ import numpy as np
 from harness import main
 from numpy.typing import NDArray
 from pivoting.controller.kernels.compiled_step import world_wrench
-from pivoting.controller.rotations import CONJUGATE, quaternion_product, rotated
+from pivoting.controller.rotations import angle_between, rotated
 from pivoting.sim import simulate
-from pivoting.sim.joint_drag import drag_wrench
-from pivoting.sim.pipeline.bounded_control import BoundedControl, applied
-from pivoting.sim.pipeline.law_control import LawControl, LawSolver
-from pivoting.sim.pipeline.stages import ANGULAR_VELOCITY, ORIENTATION, POSITION, Answers, Control
+from pivoting.sim.pipeline.bounded_control import applied
+from pivoting.sim.pipeline.stages import ANGULAR_VELOCITY, ORIENTATION, POSITION, Answers
 from pivoting.sim.run import Run
-from pivoting.sim.scenario_horizon import receding_horizon_control
-from pivoting.sim.simulation import Begun, set_up
+from pivoting.sim.run_setup import set_up
+from pivoting.sim.scenario_control import decide, laws_of, stages_of
 from rich.progress import track
 
 Array = NDArray[np.float64]
@@ -50,17 +48,6 @@ class Path(NamedTuple):
     force: Array
 
 
-def control_of(begun: Begun) -> Control:
-    """The control with which `simulate` would run the scenario."""
-    case, (_, attached, there) = begun.case, begun.belief
-    bounds, dt = case.bounds(there.unit), begun.world.dt
-    law = LawSolver(attached.controller, bounds)
-    control: Control = LawControl(law, begun.told, drag_wrench(attached.body, attached.controller, *begun.told))
-    if case.plan_hz is not None:
-        control = receding_horizon_control(case, begun.belief, law, begun.follow, 1, dt, begun.steps)
-    return BoundedControl(control, attached.controller, bounds, dt) if bounds.any else control
-
-
 def in_drake(run: Run, kind: str, approximation: str) -> Path:
     """The closed loop of a run of one world, from the same start, in Drake."""
     from drake_world import DrakeWorld  # of the extra [bench]
@@ -69,7 +56,8 @@ def in_drake(run: Run, kind: str, approximation: str) -> Path:
     there, start = begun.world, run.start[0][0]
     world = DrakeWorld(there.model, there.truth, there.mu, start, kind=kind, approximation=approximation)
     world.rest(run.wrench_world[0, 0], float(run.force[0, 0, :, -1].sum()))
-    control, controller = control_of(begun), begun.belief.attached.controller
+    stages, controller = stages_of(begun), begun.belief.attached.controller
+    control = decide(begun, stages, laws_of(begun, stages)).control  # as `simulate` has it
     answers = Answers.empty((begun.steps, 1), *controller.widths)
     states, force, wrench, before = world.states, np.empty((begun.steps, 3)), np.empty(6), None
     control.prepare(states, Answers.empty((1,), *controller.widths))
@@ -77,7 +65,7 @@ def in_drake(run: Run, kind: str, approximation: str) -> Path:
     for k in range(begun.steps):
         control(k, states, before, now := Answers(answers.values[k], answers.status[k], answers.nw))
         before = now.wrench
-        world_wrench(controller.belief.wrench_map, states.orientation[0], applied(before)[0], wrench)
+        world_wrench(controller.belief.source.map, states.orientation[0], applied(before)[0], wrench)
         force[k] = world.step(wrench)
         states = world.states
         values.append(states.values[0])
@@ -104,12 +92,6 @@ def integration_alone(run: Run, path: Path) -> float:
     return 1e3 * float(np.linalg.norm(drift[..., :2], axis=-1).max())
 
 
-def apart(one: Array, other: Array) -> Array:
-    """(N+1,) angle [deg] between orientations."""
-    turned = quaternion_product(one, other * CONJUGATE)
-    return np.rad2deg(2.0 * np.arctan2(np.linalg.norm(turned[:, 1:], axis=1), np.abs(turned[:, 0])))
-
-
 def compared(run: Run, path: Path) -> dict[str, float]:
     """What is judged of a path: its slip, its angle, and how far it is from MuJoCo's."""
     here, settled = in_mujoco(run), run.time >= run.limits.settle_s - 1e-12
@@ -118,7 +100,7 @@ def compared(run: Run, path: Path) -> dict[str, float]:
     rms = {
         name: float(np.sqrt(np.mean(np.square(values))))
         for name, values in (
-            ("angle", apart(path.orientation, run.desired[0])[settled]),
+            ("angle", np.rad2deg(angle_between(path.orientation, run.desired[0]))[settled]),
             ("force", here.force[counted]),
             ("off", path.force[counted] - here.force[counted]),
         )
@@ -127,7 +109,9 @@ def compared(run: Run, path: Path) -> dict[str, float]:
     return {
         "slip, mm": slip(run, path),
         "angle error, RMS, deg": rms["angle"],
-        "angle against MuJoCo's, greatest, deg": float(apart(path.orientation, here.orientation)[settled].max()),
+        "angle against MuJoCo's, greatest, deg": float(
+            np.rad2deg(angle_between(path.orientation, here.orientation)[settled].max())
+        ),
         "contact force against MuJoCo's, RMS, %": 100.0 * rms["off"] / rms["force"],
         "without contact, s": float(np.count_nonzero(~pushed[steps]) * run.dt),
     }
@@ -137,7 +121,7 @@ def measure(quick: bool) -> dict[str, float]:
     """The figures; see the head of this file."""
     out = {}
     for name in track(SCENARIOS, "scenarios", transient=True):
-        run = simulate(name)
+        run = simulate(name, landing="ignored")  # one stance: Drake's world does not tell how many contacts it has
         here = in_mujoco(run)
         judged = compared(run, here)
         out |= {f"{name}: MuJoCo, {what}": judged[what] for what in ("slip, mm", "angle error, RMS, deg")}

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from pivoting.controller.motion import Motion
 from pivoting.controller.references import MinimumJerk, Reference
 from pivoting.controller.rotations import exponential, quaternion_product, rotation_error, rotation_matrix
-from pivoting.controller.validate import Array, array, fail, number, unit_quaternions
+from pivoting.controller.validate import Array, array, fail, frozen, number, unit_quaternions
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +69,7 @@ class Waypoints:
         if len(points) < 2:
             raise fail("orientations", points, "at least two quaternions")
         points = np.array([unit_quaternion("orientations", point) for point in points])
-        points.flags.writeable = False
-        object.__setattr__(self, "orientations", points)
+        object.__setattr__(self, "orientations", frozen(points))
         object.__setattr__(self, "seconds", number("seconds", seconds, above=0.0, unit="s"))
         object.__setattr__(self, "hold", number("hold", hold, at_least=0.0, unit="s"))
 

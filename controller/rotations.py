@@ -68,6 +68,12 @@ def quaternion_product(p: ArrayLike, q: ArrayLike) -> Array:
     return stacked(out)
 
 
+def angle_between(p: ArrayLike, q: ArrayLike) -> Array:
+    """(...,) angle of the rotation between orientations (..., 4), from 0 to pi [rad]; shapes broadcast."""
+    turned = quaternion_product(p, np.asarray(q) * CONJUGATE)
+    return np.asarray(2.0 * np.arctan2(np.linalg.norm(turned[..., 1:], axis=-1), np.abs(turned[..., 0])))
+
+
 @kernel
 def fill_rotation(q, out):  # type: ignore[no-untyped-def]
     """Write the rotation matrix (3, 3) of quaternion q (4,) into out; q need not be exactly of unit length."""

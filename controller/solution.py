@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from pivoting.controller.errors import SolveError
-from pivoting.controller.validate import Array
+from pivoting.controller.validate import Array, frozen
 from pivoting.controller.wrench_problem import WrenchProblem
 
 TOLERANCE = 1e-7  # relative KKT residual; the closed form stays below 1e-11, interior points reach about 1e-9
@@ -71,9 +71,9 @@ def certified(
         status = INSCRIBED if edges else STATUS[0]
     else:
         status = STATUS[1] if np.isfinite(residual) else STATUS[2]
-    for values in (wrench, force):
-        values.flags.writeable = False
-    solution = Solution(problem, wrench, force.reshape(-1, problem.dim), residual, status, method, seconds, edges)
+    solution = Solution(
+        problem, frozen(wrench), frozen(force).reshape(-1, problem.dim), residual, status, method, seconds, edges
+    )
     if not residual <= tolerance:
         raise SolveError(solution, tolerance, message)
     return solution

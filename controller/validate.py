@@ -1,12 +1,14 @@
 """Checks of arguments; their error names the argument, its value and what is allowed."""
 
 from math import hypot
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pivoting.errors import PivotingError
 
 Array = NDArray[np.float64]
+AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
 
 
 class InputError(PivotingError, ValueError):
@@ -17,6 +19,12 @@ def fail(name: str, value: object, allowed: str) -> InputError:
     """The error to raise for an argument `name` whose `value` is not `allowed`."""
     shown = str(value.tolist()) if isinstance(value, np.ndarray) else repr(value)
     return InputError(f"{name} = {shown if len(shown) < 120 else shown[:117] + '...'}: must be {allowed}")
+
+
+def frozen(values: AnyArray) -> AnyArray:
+    """An array, made read-only: what is handed on is not changed by whoever gets it."""
+    values.flags.writeable = False
+    return values
 
 
 def array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
@@ -34,8 +42,7 @@ def array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
         raise fail(name, value, f"of shape {_shown(shape)}, not {out.shape}")
     if not np.isfinite(out).all():
         raise fail(name, value, "finite")
-    out.flags.writeable = False
-    return out
+    return frozen(out)
 
 
 def _shown(shape: tuple[int | None, ...]) -> str:

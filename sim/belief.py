@@ -1,6 +1,5 @@
 """What the controller believes of a scenario: the object, where it is placed, and the controller made for them."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -18,6 +17,9 @@ from pivoting.sim.placement import Placement, placed
 from pivoting.sim.scenarios.scenario import PACE, Scenario
 from pivoting.sim.scenarios.scenario_keys import CONTROL_KEYS, LOWEST
 from pivoting.sim.stances import Stance
+
+Controllers = WrenchController | list[WrenchController] | tuple[WrenchController, ...] | None
+"""What may be given in place of a scenario's own controller: another, or one for each world."""
 
 
 class Believed(NamedTuple):
@@ -46,9 +48,7 @@ class Believed(NamedTuple):
         return self._replace(attached=attached, stances=stances)
 
 
-def believe(
-    case: Scenario, read: Scene, worlds: int = 1, given: WrenchController | Sequence[WrenchController] | None = None
-) -> Believed:
+def believe(case: Scenario, read: Scene, worlds: int = 1, given: Controllers = None) -> Believed:
     """What the scenario's controller, or others, believe.
 
     Args:
@@ -117,12 +117,12 @@ def _no_landing(case: Scenario, model: mujoco.MjModel, there: Placement) -> str:
     return ""
 
 
-def _given(given: WrenchController | Sequence[WrenchController] | None, worlds: int) -> tuple[WrenchController, ...]:
+def _given(given: Controllers, worlds: int) -> tuple[WrenchController, ...]:
     """The controllers that were given; none, where the scenario's own is to be made."""
     if given is None:
         return ()
     if not isinstance(given, list | tuple):
-        return (given,)  # type: ignore[return-value]
+        return (given,)
     if len(given) != worlds:
         raise fail("controller", f"{len(given)} of them", f"one, or one for each of the {worlds} worlds")
     return tuple(given)

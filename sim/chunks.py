@@ -117,15 +117,7 @@ class _Kept:
         """The fleet, without why it failed."""
         sampled, plans = self._arrays[WorldSamples], self._arrays[PlanLog]
         fleet = Fleet(
-            scenario=begun.asked,
-            seed=begun.setting.seed,
-            first_world=begun.setting.first_world,
-            attached=begun.belief.attached,
-            load=begun.belief.placement.load,
-            world=begun.world,
-            stances=begun.belief.stances,
-            time=begun.time,
-            reference=begun.reference,
+            **begun.experiment,
             wall_s=self._wall_s,
             plans=PlanLog(**plans) if plans else None,
             events=tuple(self._events),

@@ -3,11 +3,12 @@
 import re
 import tempfile
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from math import isnan
 from pathlib import Path
 
 import mujoco
+from pivoting.sim.interrupts import uninterrupted
 
 _ENTRY = re.compile(r"^(?:WARNING|ERROR) .*? \d{4}: (.*?)\s*(?:Time = (\S+)\.)?$", flags=re.MULTILINE)
 
@@ -23,10 +24,11 @@ def engine_log() -> Iterator[list[str]]:
     said: list[str] = []
     before, now = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
     with ExitStack() as stack:
-        try:
-            log: Path | None = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="pivoting-"))) / "log"
-        except OSError:
-            log = None
+        log: Path | None = None
+        with suppress(OSError), uninterrupted():  # or a folder that is made might not be known yet
+            folder = tempfile.TemporaryDirectory(prefix="pivoting-")
+            stack.callback(_remove, folder)
+            log = Path(folder.name) / "log"
         now.logto_console, now.logto_file = log is None, log is not None
         now.logfile = str(log)
         stack.callback(mujoco.MjLogConfig.set, before)
@@ -34,6 +36,11 @@ def engine_log() -> Iterator[list[str]]:
         yield said
         if log is not None and log.exists():
             said += _distinct(log.read_text(errors="replace"))
+
+
+def _remove(folder: tempfile.TemporaryDirectory[str]) -> None:
+    with uninterrupted():
+        folder.cleanup()
 
 
 def _distinct(text: str) -> list[str]:

@@ -1,13 +1,16 @@
 """What a run and a fleet have in common: what was set up, and the verdict on what was measured."""
 
+import os
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.units import lever
+from pivoting.controller.validate import frozen
 from pivoting.controller.wrench_controller import WrenchController
 from pivoting.models.rigid_body import RigidBody
 from pivoting.sim.attachment import Attached
@@ -29,7 +32,7 @@ Array = NDArray[np.float64]
 def freeze(values: Any) -> None:
     """Make an array read-only, or all arrays of a tuple or of measures."""
     if isinstance(values, np.ndarray):
-        values.flags.writeable = False
+        frozen(values)
     elif isinstance(values, Measures):
         freeze(tuple(vars(values).values()))
     elif isinstance(values, tuple):
@@ -92,6 +95,10 @@ class Experiment:
         @property
         def open_loop(self) -> bool:
             """Whether a plan was played, whatever the object did."""
+
+        @property
+        def keep(self) -> str:
+            """What was kept: "all", "reduced" or "measures"."""
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """From pickle, which forgets that arrays are read-only."""
@@ -187,3 +194,17 @@ class Experiment:
     def summary(self) -> dict[str, Any]:
         """All of it in numbers, of the worst world, SI units in the keys; what `--json` prints."""
         return summary(self)
+
+    def save(self, folder: str | os.PathLike[str]) -> Path:
+        """Keep it in a folder, from which `pivoting.load` gets it back, and return that.
+
+        It is made if need be, and gets two files, both of them whole or neither: run.nc, all arrays, which
+        `xarray.open_dataset(..., engine="scipy")` opens, and scenario.json, which `pivoting run --scenario` runs again,
+        if nothing that the run was made with is a Python object. What was kept there before is replaced.
+
+        Raises:
+            OSError: a file cannot be written.
+        """
+        from pivoting.sim.saved_run import save  # which makes runs and fleets
+
+        return save(self, folder)

@@ -1,16 +1,13 @@
 """A fleet: many worlds of which only measures, and perhaps samples, are kept; any of them can be run again in full."""
 
-import os
-from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.validate import InputError, fail
-from pivoting.controller.wrench_controller import WrenchController
 from pivoting.errors import PivotingError
+from pivoting.sim.belief import Controllers
 from pivoting.sim.experiment import Experiment
 from pivoting.sim.judging.findings import Findings
 from pivoting.sim.judging.measures import Measures
@@ -38,14 +35,14 @@ class ReplayError(PivotingError, RuntimeError):
 class Handed(NamedTuple):
     """What was handed to `simulate` beside the scenario; None for what was not."""
 
-    controller: WrenchController | Sequence[WrenchController] | None = None
+    controller: Controllers = None
     control: OwnControlFunction | None = None
     observe: Observe | None = None
 
     def of(self, world: int) -> "Handed":
         """What one of the worlds has of it."""
-        several = isinstance(self.controller, Sequence)
-        return self._replace(controller=self.controller[world]) if several else self  # type: ignore[index]
+        each = self.controller
+        return self._replace(controller=each[world]) if isinstance(each, list | tuple) else self
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -139,16 +136,6 @@ class Fleet(Experiment):
     def summary(self) -> dict[str, Any]:
         """The fleet in numbers, of the worst world, with the keys of a run's summary; what `--json` prints."""
         return {**super().summary(), "keep": self.keep, "events_left_out": self.events_left_out}
-
-    def save(self, folder: str | os.PathLike[str]) -> Path:
-        """Keep the fleet in a folder, from which `pivoting.load` gets it back, and return that; see `Run.save`.
-
-        Raises:
-            OSError: a file cannot be written.
-        """
-        from pivoting.sim.saved_run import save  # which makes fleets
-
-        return save(self, folder)
 
     def to_dataframe(self) -> "pandas.DataFrame":
         """A row for each world, with its measures, and whether it passed.

@@ -4,18 +4,17 @@ Dimensions: world (W); sample (S), at `time`; plan (P), of a receding horizon; s
 their names end with; samples are in the model's unit of length, as in the file of a run.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from pivoting.controller.wrench_controller import WrenchController
+from pivoting.sim.belief import Controllers
 from pivoting.sim.experiment import freeze
 from pivoting.sim.fleet import Fleet, Handed, WorldSamples
 from pivoting.sim.judging.findings import Findings
 from pivoting.sim.judging.measures import Measures
 from pivoting.sim.netcdf import Variable
-from pivoting.sim.pipeline.plan_log import Event
-from pivoting.sim.run_arrays import WRENCH, Arrays, Meaning, meaning_of, plans_of, variable
+from pivoting.sim.run_arrays import WRENCH, Arrays, Meaning, meaning_of, outcome_of, outcome_words, variable
 from pivoting.sim.run_setup import Begun
 
 _MEASURES = {  # what they are; dimension and unit follow from the name
@@ -62,10 +61,8 @@ def fleet_described(fleet: Fleet) -> dict[str, Variable]:
 def fleet_outcome(fleet: Fleet) -> dict[str, Any]:
     """What came of a fleet beside its arrays."""
     return {
-        "wall_s": fleet.wall_s,
-        "events": fleet.events,
+        **outcome_words(fleet),
         "events_left_out": fleet.events_left_out,
-        "engine_warnings": fleet.engine_warnings,
         "findings": fleet.findings._asdict(),
     }
 
@@ -75,7 +72,7 @@ def fleet_of(
     arrays: Arrays,
     outcome: Mapping[str, Any],
     python_objects: tuple[str, ...],
-    controller: WrenchController | Sequence[WrenchController] | None,
+    controller: Controllers,
 ) -> Fleet:
     """The fleet again.
 
@@ -87,19 +84,8 @@ def fleet_of(
     """
     kept = {name: arrays[name] for name in WorldSamples._fields} if "theta" in arrays else None
     fleet = Fleet(
-        scenario=begun.asked,
-        seed=begun.setting.seed,
-        first_world=begun.setting.first_world,
-        attached=begun.belief.attached,
-        load=begun.belief.placement.load,
-        world=begun.world,
-        stances=begun.belief.stances,
-        time=begun.time,
-        reference=begun.reference,
-        wall_s=outcome["wall_s"],
-        plans=plans_of(arrays),
-        events=tuple(Event(*event) for event in outcome["events"]),
-        engine_warnings=tuple(outcome["engine_warnings"]),
+        **begun.experiment,
+        **outcome_of(arrays, outcome),
         python_objects=python_objects,
         measures=Measures(**{name: arrays[name] for name in _MEASURES}),
         samples=None if kept is None else WorldSamples(**kept),

@@ -15,16 +15,17 @@ from pivoting.controller.planning.equations_of_motion import Path
 from pivoting.controller.planning.horizon_program import Guess
 from pivoting.controller.planning.receding_horizon import OUTCOMES
 from pivoting.controller.solution import STATUS
+from pivoting.controller.validate import frozen
 from pivoting.models.length_unit import POWERS
 from pivoting.sim.contact_sensing import ContactReadings
 from pivoting.sim.judging.predicted_slip import RowEffects
 from pivoting.sim.netcdf import Variable
 from pivoting.sim.pipeline.log import Log, worlds_first
-from pivoting.sim.pipeline.plan_log import PlanLog
+from pivoting.sim.pipeline.plan_log import Event, PlanLog
 from pivoting.sim.pipeline.stages import ANGULAR_VELOCITY, ORIENTATION, POSITION, VELOCITY, Answers
-from pivoting.sim.trajectory import frozen
 
 if TYPE_CHECKING:
+    from pivoting.sim.experiment import Experiment
     from pivoting.sim.run import Run
 
 Array = NDArray[Any]
@@ -179,6 +180,21 @@ def plans_of(arrays: Arrays) -> PlanLog | None:
         return None
     kept = {name: arrays[f"plans_{name}"] for name in PlanLog._fields}
     return PlanLog(**{**kept, "step": frozen(kept["step"].astype(np.int64))})  # a file has 32 bits for it
+
+
+def outcome_words(run: "Experiment") -> dict[str, Any]:
+    """What came of a run or a fleet beside its arrays, for a file."""
+    return {"wall_s": run.wall_s, "events": run.events, "engine_warnings": run.engine_warnings}
+
+
+def outcome_of(arrays: Arrays, words: Mapping[str, Any]) -> dict[str, Any]:
+    """What came of a run or a fleet out of its file, by field of `Experiment`; `words` are those of `outcome_words`."""
+    return {
+        "wall_s": words["wall_s"],
+        "plans": plans_of(arrays),
+        "events": tuple(Event(*event) for event in words["events"]),
+        "engine_warnings": tuple(words["engine_warnings"]),
+    }
 
 
 def plan_of(arrays: Arrays) -> tuple[tuple[Array, Array], Guess] | None:

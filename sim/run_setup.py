@@ -1,19 +1,17 @@
 """What a run needs before it begins: the world, the belief, the reference; from a scenario."""
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.orientation_references import Turn
 from pivoting.controller.references import Reference
-from pivoting.controller.validate import fail
+from pivoting.controller.validate import fail, frozen
 from pivoting.controller.wrench_bounds import WrenchBounds
-from pivoting.controller.wrench_controller import WrenchController
 from pivoting.models.frames import matrix
 from pivoting.models.scenes import load
-from pivoting.sim.belief import Believed, believe
+from pivoting.sim.belief import Believed, Controllers, believe
 from pivoting.sim.pipeline.stages import Setting
 from pivoting.sim.placement import Placement
 from pivoting.sim.scenarios.scenario import Scenario
@@ -53,6 +51,21 @@ class Begun(NamedTuple):
         """N."""
         return len(self.time) - 1
 
+    @property
+    def experiment(self) -> dict[str, Any]:
+        """What is known before it runs, by field of `Experiment`."""
+        return {
+            "scenario": self.asked,
+            "seed": self.setting.seed,
+            "first_world": self.setting.first_world,
+            "attached": self.belief.attached,
+            "load": self.belief.placement.load,
+            "world": self.world,
+            "stances": self.belief.stances,
+            "time": self.time,
+            "reference": self.reference,
+        }
+
     def part(self, first: int, worlds: int) -> "Begun":
         """The same for some of the worlds, from that with the index `first` on."""
         setting = self.setting
@@ -62,12 +75,11 @@ class Begun(NamedTuple):
 
 def set_up(
     asked: Scenario,
-    controller: WrenchController | Sequence[WrenchController] | None,
+    controller: Controllers,
     *,
     worlds: int,
     seed: int,
     first_world: int,
-    keep: str = "all",
 ) -> Begun:
     """The world and the belief of a scenario; arguments and errors as of `simulate`."""
     for key, value, least in (("worlds", worlds, 1), ("seed", seed, 0), ("first_world", first_world, 0)):
@@ -82,7 +94,7 @@ def set_up(
     turning = -matrix(belief.placement.body.table)[:, 1:2].T if belief.placement.body.dim == 2 else np.eye(3)
     counts = int(seed), int(worlds), int(first_world)
     setting = Setting(*counts, world.dt, turning, belief.attached.controller.law)
-    timed = _timed(case, belief, world, int(worlds) if keep == "all" else 1)
+    timed = _timed(case, belief, world)
     return Begun(asked, case, belief, world, *timed, setting)
 
 
@@ -93,34 +105,37 @@ def on_reference(begun: Begun, reference: Reference, seconds: float) -> Begun:
         ValueError: it does not keep the object on its contact.
     """
     case = replace(begun.case, reference=reference, seconds=seconds)
-    timed = _timed(case, begun.belief, begun.world, begun.setting.worlds)
+    timed = _timed(case, begun.belief, begun.world)
     return Begun(begun.asked, case, begun.belief, begun.world, *timed, begun.setting)
 
 
-def _timed(
-    case: Scenario, belief: Believed, world: World, worlds: int
-) -> tuple[Array, Samples, Samples, Samples, Turn]:
+def refuse_too_many(begun: Begun) -> None:
+    """Raise if all steps of all worlds are more than are kept in memory.
+
+    Raises:
+        ValueError: they are; it says how many there may be.
+    """
+    worlds, steps = begun.setting.worlds, begun.steps
+    if steps * worlds > MAX_STEPS:
+        told = f"at most {MAX_STEPS // steps}: of {steps} steps each, more are not kept in memory"
+        raise fail("worlds", worlds, f"{told}; or any number with keep = 'measures'")
+
+
+def _timed(case: Scenario, belief: Believed, world: World) -> tuple[Array, Samples, Samples, Samples, Turn]:
     """Time, reference, desired, told and follow; see `Begun`."""
-    time = _times(case, world.dt, worlds)
+    time = _times(case, world.dt)
     reference, desired, _ = _desired(case, world.placement, time)
     told, follow = _desired(case, belief.placement, time)[1:]  # the controller knows only the table that it believes in
     for values in (time, *reference, *desired):
-        values.flags.writeable = False
+        frozen(values)
     return time, reference, desired, told, follow
 
 
-def _times(case: Scenario, dt: float, worlds: int) -> Array:
+def _times(case: Scenario, dt: float) -> Array:
     """(N+1,) when each step begins, and the last ends [s]."""
     steps = round(case.duration / dt)
     if not 2 <= steps <= MAX_STEPS:
         raise fail("seconds", case.duration, f"such that a world takes 2 to {MAX_STEPS} steps, at dt = {dt:g} s")
-    if steps * worlds > MAX_STEPS:
-        raise fail(
-            "worlds",
-            worlds,
-            f"at most {MAX_STEPS // steps}: of {steps} steps each, more are not kept in memory; or any number with"
-            " keep = 'measures'",
-        )
     if steps * dt <= case.limits.settle_s:
         raise fail("seconds", case.duration, f"more than the {case.limits.settle_s:g} s that the verdict lets settle")
     time: Array = dt * np.arange(steps + 1, dtype=float)

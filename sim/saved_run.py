@@ -3,7 +3,7 @@
 import hashlib
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -13,16 +13,16 @@ import numpy as np
 from pivoting import __version__
 from pivoting.controller.planning.horizon_program import HorizonProgram
 from pivoting.controller.planning.sequential_convex import Plan
-from pivoting.controller.validate import InputError
-from pivoting.controller.wrench_controller import WrenchController
+from pivoting.controller.validate import InputError, frozen
 from pivoting.models.errors import ModelError
+from pivoting.sim.belief import Controllers
 from pivoting.sim.drawing.recording_id import digest
+from pivoting.sim.experiment import Experiment
 from pivoting.sim.fleet import Fleet
 from pivoting.sim.fleet_arrays import fleet_described, fleet_of, fleet_outcome
 from pivoting.sim.netcdf import Variable, read_netcdf, write_netcdf
-from pivoting.sim.pipeline.plan_log import Event
 from pivoting.sim.run import Run
-from pivoting.sim.run_arrays import Arrays, described, log_of, plan_of, plans_of
+from pivoting.sim.run_arrays import Arrays, described, log_of, outcome_of, outcome_words, plan_of
 from pivoting.sim.run_setup import Begun, set_up
 from pivoting.sim.scenario_horizon import scenario_horizon
 from pivoting.sim.scenarios.scenario import Scenario
@@ -34,14 +34,14 @@ VERSIONS = {"pivoting": __version__, "mujoco": mujoco.__version__, "numpy": np._
 _PLAN = sorted({each.name for each in fields(Plan)} - {"program", "desired", "guess"})  # what of a plan is no array
 
 
-def save(run: Run | Fleet, folder: str | os.PathLike[str]) -> Path:
-    """Write a run into a folder and return it; see `Run.save`."""
+def save(run: Experiment, folder: str | os.PathLike[str]) -> Path:
+    """Write a run into a folder and return it; see `Experiment.save`."""
     folder = Path(folder)
     write_together(folder, run_files(run, ARRAYS, SCENARIO))
     return folder
 
 
-def run_files(run: Run | Fleet, arrays: str, scenario: str) -> dict[str, Writer]:
+def run_files(run: Experiment, arrays: str, scenario: str) -> dict[str, Writer]:
     """The writers of a run's two files, by the names that these are to have.
 
     The arrays are written first, for the scenario's file says how long their file is, and what its digest is.
@@ -61,7 +61,7 @@ def run_files(run: Run | Fleet, arrays: str, scenario: str) -> dict[str, Writer]
     return {arrays: write_arrays, scenario: write_scenario}
 
 
-def description(run: Run | Fleet) -> ScenarioFile:
+def description(run: Experiment) -> ScenarioFile:
     """What the scenario's file says of a run, but for its arrays."""
     case = run.scenario
     return ScenarioFile(
@@ -70,7 +70,7 @@ def description(run: Run | Fleet) -> ScenarioFile:
         run.seed,
         run.first_world,
         open_loop=run.open_loop,
-        keep="all" if isinstance(run, Run) else run.keep,
+        keep=run.keep,
         python_objects=(*run.python_objects, *([] if expressible(case) else ["scenario"])),
         digest=digest(run),
         versions=VERSIONS,
@@ -95,7 +95,7 @@ def load(
     folder: str | os.PathLike[str],
     *,
     scenario: Scenario | None = None,
-    controller: WrenchController | Sequence[WrenchController] | None = None,
+    controller: Controllers = None,
 ) -> Run | Fleet:
     """The run that `Run.save` or `pivoting run --out` kept: the same arrays bit for bit, measures and verdict.
 
@@ -127,7 +127,7 @@ def load(
     case = scenario or file.scenario
     counts: dict[str, int] = {"worlds": file.worlds, "seed": file.seed, "first_world": file.first_world}
     try:
-        begun = set_up(case, controller, keep=file.keep, **counts)
+        begun = set_up(case, controller, **counts)
     except ValueError as error:
         kind = ModelError if isinstance(error, ModelError) else InputError
         raise kind(f"{path}: cannot be set up again: {error}") from None
@@ -153,26 +153,15 @@ def _restored(begun: Begun, arrays: Arrays, outcome: Mapping[str, Any], python_o
         )
         plan = Plan(program, desired, guess, **figures)
     for values in arrays.values():
-        values.flags.writeable = False
+        frozen(values)
     return Run(
-        scenario=begun.asked,
-        seed=begun.setting.seed,
-        first_world=begun.setting.first_world,
-        attached=begun.belief.attached,
-        load=begun.belief.placement.load,
-        world=begun.world,
+        **begun.experiment,
         start=(arrays["start_qpos"], arrays["start_qvel"]),
-        time=begun.time,
-        reference=begun.reference,
         desired=begun.desired,
         log=log_of(arrays),
-        wall_s=outcome["wall_s"],
         plan=plan,
-        stances=begun.belief.stances,
         stance=arrays.get("stance"),
-        plans=plans_of(arrays),
-        events=tuple(Event(*event) for event in outcome["events"]),
-        engine_warnings=tuple(outcome["engine_warnings"]),
+        **outcome_of(arrays, outcome),
         python_objects=python_objects,
     )
 
@@ -192,17 +181,18 @@ def _check(path: Path, run: Run | Fleet, said: Mapping[str, Any]) -> None:
         raise InputError(f"{path}: {', '.join(other)} must be as in the run that was saved")
 
 
-def _kept(run: Run | Fleet) -> tuple[dict[str, Variable], dict[str, Any]]:
+def _kept(run: Experiment) -> tuple[dict[str, Variable], dict[str, Any]]:
     """The arrays of a run or a fleet as their file has them, and what came of it beside them."""
-    return (described(run), _outcome(run)) if isinstance(run, Run) else (fleet_described(run), fleet_outcome(run))
+    if isinstance(run, Fleet):
+        return fleet_described(run), fleet_outcome(run)
+    assert isinstance(run, Run)
+    return described(run), _outcome(run)
 
 
 def _outcome(run: Run) -> dict[str, Any]:
     """What came of a run beside its arrays."""
     return {
-        "wall_s": run.wall_s,
-        "events": run.events,
-        "engine_warnings": run.engine_warnings,
+        **outcome_words(run),
         "plan": None if run.plan is None else {name: getattr(run.plan, name) for name in _PLAN},
     }
 

@@ -1,6 +1,6 @@
 """`simulate`: a closed-loop run, from a scenario to what is measured."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any, Literal, overload
@@ -8,9 +8,9 @@ from typing import Any, Literal, overload
 import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
-from pivoting.controller.validate import fail, one_of
-from pivoting.controller.wrench_controller import WrenchController
+from pivoting.controller.validate import fail, frozen, one_of
 from pivoting.models.frames import matrix
+from pivoting.sim.belief import Controllers
 from pivoting.sim.engine_log import engine_log
 from pivoting.sim.fleet import Fleet, Handed
 from pivoting.sim.keep import KEEP
@@ -26,14 +26,13 @@ from pivoting.sim.pipeline.receding_horizon_control import RecedingHorizonContro
 from pivoting.sim.pipeline.stages import Observe
 from pivoting.sim.pipeline.stance_control import StanceControl
 from pivoting.sim.run import Run
-from pivoting.sim.run_setup import Begun, set_up
+from pivoting.sim.run_setup import Begun, refuse_too_many, set_up
 from pivoting.sim.scenario_control import Decided, decide, laws_of, stages_of
 from pivoting.sim.scenarios.scenario import Scenario
 from pivoting.sim.scenarios.shipped_scenarios import scenario
 from pivoting.sim.start_states import resting_depths, start_worlds
 
 Array = NDArray[np.float64]
-Controllers = WrenchController | Sequence[WrenchController] | None
 
 
 @overload
@@ -106,9 +105,10 @@ def simulate(
     one_of("keep", keep, tuple(KEEP))
     if open_loop and keep != "all":
         raise fail("keep", keep, "'all' in open loop, where one plan is played in all worlds together")
-    begun = set_up(asked, controller, worlds=worlds, seed=seed, first_world=first_world, keep=keep)
+    begun = set_up(asked, controller, worlds=worlds, seed=seed, first_world=first_world)
     handed = Handed(controller, control, observe)
     if keep == "all":
+        refuse_too_many(begun)
         return run_worlds(begun, handed, progress, engine_log(), open_loop)
     from pivoting.sim.chunks import run_in_chunks  # which runs worlds
 
@@ -151,10 +151,7 @@ def start_batch(begun: Begun, decided: Decided) -> Batch:
 
 def start_of(batch: Batch) -> tuple[Array, Array]:
     """qpos (W, nq) and qvel (W, nv) of the worlds as they are, for `Trajectory.start`."""
-    start = np.array(batch.bind("qpos")), np.array(batch.bind("qvel"))
-    for values in start:
-        values.flags.writeable = False
-    return start
+    return frozen(np.array(batch.bind("qpos"))), frozen(np.array(batch.bind("qvel")))
 
 
 def steps_of(begun: Begun, decided: Decided, plant: Plant, apply: FreeWrench) -> Steps:
@@ -180,16 +177,8 @@ def kept(
     planned = control.inner if isinstance(control, BoundedControl) else control
     horizons = planned if isinstance(planned, RecedingHorizonControl) else None
     return Run(
-        scenario=begun.asked,
-        seed=begun.setting.seed,
-        first_world=begun.setting.first_world,
-        attached=begun.belief.attached,
-        load=begun.belief.placement.load,
-        world=begun.world,
-        stances=begun.belief.stances,
+        **begun.experiment,
         start=start,
-        time=begun.time,
-        reference=begun.reference,
         desired=begun.desired,
         log=log,
         wall_s=wall_s,

@@ -4,9 +4,10 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.controller.validate import frozen
 from pivoting.models.frames import matrix
 from pivoting.sim.judging.predicted_slip import stepped_point
-from pivoting.sim.trajectory import Trajectory, frozen
+from pivoting.sim.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
@@ -81,16 +82,11 @@ class ContactMotion(Trajectory):
 
     def since_held(self, path: Array) -> Array:
         """What has been added to a path (W, N+1, K, ...) of each contact since it is to hold; 0 until then."""
-        added = path - self.when_held(path)
-        if self.stance is None:
-            return added
         held = np.logical_or.accumulate(self.standing, axis=1)
-        return np.where(np.concatenate([held[:, :1], held], axis=1)[..., None], added, 0.0)
+        return np.where(np.concatenate([held[:, :1], held], axis=1)[..., None], path - self.when_held(path), 0.0)
 
     def when_held(self, path: Array) -> Array:
         """(W, 1, K, ...) a path (W, N+1, K, ...) of each contact at the first moment at which it is to hold."""
-        if self.stance is None:
-            return path[:, :1]
         first = self.standing.argmax(axis=1)[:, None]
         return np.take_along_axis(path, first[..., None], axis=1)
 

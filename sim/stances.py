@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.controller.validate import frozen
 from pivoting.controller.wrench_controller import WrenchController
 
 
@@ -21,9 +22,7 @@ class Stance(NamedTuple):
     @classmethod
     def of(cls, held: list[bool], controllers: tuple[WrenchController, ...]) -> "Stance":
         """Of the declared contacts those that are held, by these controllers."""
-        which = np.array(held)
-        which.flags.writeable = False
-        return cls(which, controllers)
+        return cls(frozen(np.array(held)), controllers)
 
     @property
     def columns(self) -> NDArray[np.intp]:

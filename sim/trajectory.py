@@ -8,18 +8,13 @@ from numpy.typing import NDArray
 from pivoting.controller.plane_and_space import Space, space
 from pivoting.controller.planning.sequential_convex import Plan
 from pivoting.controller.rotations import CONJUGATE, quaternion_product, rotated
+from pivoting.controller.validate import frozen
 from pivoting.models.frames import matrix
 from pivoting.sim.experiment import Experiment
 from pivoting.sim.pipeline.log import Log
 from pivoting.sim.pipeline.stages import ANGULAR_VELOCITY, ORIENTATION, POSITION, VELOCITY
 
 Array = NDArray[np.float64]
-
-
-def frozen(values: Array) -> Array:
-    """What is measured cannot be changed before it is judged."""
-    values.flags.writeable = False
-    return values
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +97,7 @@ class Trajectory(Experiment):
         """(W, N, K) which contacts are to hold in each step."""
         held = np.array([stance.held for stance in self.stances])
         if self.stance is None:
-            return np.broadcast_to(held[0], (*self.log.control_ns.shape, len(held[0])))[None].repeat(self.worlds, 0)
+            return np.broadcast_to(held[0], (*self.log.answers.status.shape, held.shape[1]))
         return held[self.stance]
 
     @property

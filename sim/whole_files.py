@@ -2,11 +2,11 @@
 
 import errno
 import os
-import signal
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from threading import current_thread, main_thread
+
+from pivoting.sim.interrupts import uninterrupted
 
 Writer = Callable[[Path], object]  # writes a file to the path that it is called with
 
@@ -33,7 +33,7 @@ def write_together(folder: Path, writers: Mapping[str, Writer]) -> None:
         for target in parts:
             if target.is_dir():
                 raise IsADirectoryError(errno.EISDIR, "a folder is where the file is to be", str(target))
-        with _uninterrupted():
+        with uninterrupted():
             for target, part in parts.items():
                 part.replace(target)
             done = True
@@ -56,19 +56,3 @@ def whole(path: Path) -> Iterator[Path]:
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
-
-
-@contextmanager
-def _uninterrupted() -> Iterator[None]:
-    """A SIGINT that comes meanwhile is sent again when this is over."""
-    if current_thread() is not main_thread():  # an interrupt is raised in that one alone
-        yield
-        return
-    came: list[int] = []
-    handler = signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, handler)
-        for number in came[:1]:
-            signal.raise_signal(number)

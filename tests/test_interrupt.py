@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from time import monotonic, sleep
@@ -11,6 +12,7 @@ from time import monotonic, sleep
 import pytest
 from pivoting.sim import Run
 from pivoting.sim.console.output_files import save
+from pivoting.sim.engine_log import engine_log
 
 from tests.processes import started
 
@@ -65,6 +67,27 @@ def test_in_the_loop(tmp_path: Path, times: int, keep: str) -> None:
     interrupted_when(lambda: bool(list(temporary.glob("pivoting-*"))), process, times)
     assert list(temporary.iterdir()) == []
     assert list(out.iterdir()) == []
+
+
+@pytest.mark.parametrize("moment", ["mkdtemp", "rmtree"])
+def test_as_a_temporary_folder_is_made_or_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moment: str) -> None:
+    """The moment in which it is there, and nothing that would remove it is known yet, or any longer."""
+    module = {"mkdtemp": tempfile, "rmtree": tempfile.TemporaryDirectory}[moment]
+    name = {"mkdtemp": "mkdtemp", "rmtree": "_rmtree"}[moment]
+    real = getattr(module, name)
+
+    def interrupted(*args: object, **options: object) -> object:
+        if moment == "rmtree":
+            signal.raise_signal(signal.SIGINT)
+        done = real(*args, **options)
+        signal.raise_signal(signal.SIGINT)
+        return done
+
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(module, name, staticmethod(interrupted))
+    with pytest.raises(KeyboardInterrupt), engine_log():
+        pass
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_while_results_are_written(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from pivoting.controller.rotations import fill_differences, quaternion_product, 
 from pivoting.controller.solvers.clarabel_backend import ClarabelWithRetry
 from pivoting.controller.solvers.conic_program import USABLE, ConicSolver
 from pivoting.controller.solvers.qpsolvers_backend import QuadraticBackend, installed_backend
-from pivoting.controller.validate import Array, array, fail, number, unit_quaternions
+from pivoting.controller.validate import Array, array, fail, frozen, number, unit_quaternions
 
 CONVERGED = 1e-9  # change of a pass, in weights, levers and radians
 STATUS = ("solved", "not converged", "infeasible", "failed")
@@ -62,19 +62,19 @@ class Plan:
     @cached_property
     def position(self) -> Array:
         """The CoM (N+1, 3) at each pose [m], world axes."""
-        return _frozen(self.guess.path.position @ self.horizon.table.T)
+        return frozen(self.guess.path.position @ self.horizon.table.T)
 
     @cached_property
     def orientation(self) -> Array:
         """The orientation (N+1, 4) at each pose, object axes to world."""
-        return _frozen(quaternion_product(self.horizon.controller.base, self.guess.path.orientation))
+        return frozen(quaternion_product(self.horizon.controller.base, self.guess.path.orientation))
 
     @cached_property
     def velocity(self) -> Array:
         """The velocity (N+1, 3) of the CoM with which each pose is reached, world axes [m/s]."""
         path = self.guess.path
         moved = np.concatenate([path.arriving[None, :3], np.diff(path.position, axis=0)])
-        return _frozen(moved @ self.horizon.table.T / self.horizon.h)
+        return frozen(moved @ self.horizon.table.T / self.horizon.h)
 
     @cached_property
     def angular_velocity(self) -> Array:
@@ -83,7 +83,7 @@ class Plan:
         turned = np.empty((len(path.position), 3))
         turned[0] = path.arriving[3:]
         fill_differences(path.orientation, turned[1:])
-        return _frozen(rotated(self.orientation, turned / self.horizon.h))
+        return frozen(rotated(self.orientation, turned / self.horizon.h))
 
     @property
     def wrench(self) -> Array:
@@ -94,11 +94,6 @@ class Plan:
     def force(self) -> Array:
         """The contact forces (N, K, d), contact axes [N]."""
         return self.guess.force.reshape(self.horizon.steps, -1, self.horizon.controller.space.dim)
-
-
-def _frozen(values: Array) -> Array:
-    values.flags.writeable = False
-    return values
 
 
 class Planner:
@@ -213,7 +208,7 @@ class Planner:
                 break
         motion, stick = self.program.defects(found.guess)
         for values in (found.guess.wrench, found.guess.force):
-            values.flags.writeable = False
+            frozen(values)
         return Plan(
             self.program,
             wanted,

@@ -123,14 +123,12 @@ def predicted_slip(run: "ContactMotion") -> Array:
     path = drift(
         run.world.contact_rows, _held(run), turning, touching, run.stepped_velocity, omega, unseen(run), _settle(run)
     )
-    return path if run.stance is None else run.since_held(path)
+    return run.since_held(path)
 
 
 def _held(run: "ContactMotion") -> RowEffects:
     """What the rows do at the contacts; of one that is not to hold yet, nothing has to be known."""
     held = run.log.held
-    if run.stance is None:
-        return held
     give = np.where(run.standing[..., None], held.give, held.give[..., :1, :])  # the first is held in every stance
     return held._replace(give=give, slides=held.slides & run.standing)
 

@@ -9,7 +9,7 @@ from pivoting.controller.belief import for_worlds
 from pivoting.controller.kernels.compiled_step import step_worlds
 from pivoting.controller.wrench_bounds import WrenchBounds
 from pivoting.controller.wrench_controller import WrenchController
-from pivoting.sim.pipeline.stages import Answers, Correct, Desired, States, stacked
+from pivoting.sim.pipeline.stages import Answers, Correct, Desired, States, desired_values
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-9  # relative KKT residual of an answer that counts as solved
@@ -54,7 +54,7 @@ class LawControl:
     """
 
     def __init__(self, law: LawSolver, desired: tuple[Array, Array, Array], external: Array):
-        self._desired, self._external = stacked(*desired)[:, None], external
+        self._desired, self._external = desired_values(*desired)[:, None], external
         self._always = external[0] if len(external) == 1 else None
         self._solve, self._decide = law.solve, law if law.correct else law.solve  # a call less at every step
 

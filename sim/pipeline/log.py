@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.kernels.compiled_step import STATE
+from pivoting.controller.validate import frozen
 from pivoting.sim.contact_sensing import ContactReadings
 from pivoting.sim.judging.predicted_slip import RowEffects
 from pivoting.sim.pipeline.stages import Answers
@@ -78,7 +79,7 @@ def some_steps(log: Log, first: int, last: int) -> Log:
 
 def worlds_first(log: Log) -> Log:
     """With (world, step) first, read-only."""
-    log.control_ns.flags.writeable = False
+    frozen(log.control_ns)
     turned = {name: _turned(values) for name, values in log._asdict().items() if name != "control_ns"}
     return log._replace(**turned)
 
@@ -89,6 +90,4 @@ def _turned(values: Any) -> Any:
         return values
     if isinstance(values, tuple):
         return type(values)(*map(_turned, values))
-    out = np.moveaxis(values, 1, 0)
-    out.flags.writeable = False
-    return out
+    return frozen(np.moveaxis(values, 1, 0))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pivoting.controller.solution import FAILED, UNCERTIFIED
 from pivoting.controller.validate import fail
-from pivoting.sim.pipeline.stages import Answers, Desired, States, stacked
+from pivoting.sim.pipeline.stages import Answers, Desired, States, desired_values
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class OwnControl:
         if not callable(function):
             raise fail("control", function, "a function of a Moment that gives the wrench")
         self._function, self._dt, self._first = function, dt, first_world
-        self._desired = stacked(*desired)[:, None]
+        self._desired = desired_values(*desired)[:, None]
 
     def prepare(self, states: States, out: Answers) -> None:
         """Nothing has to be done; the function is not asked before its time."""

@@ -8,7 +8,7 @@ from pivoting.controller.planning.receding_horizon import OUTCOMES, Followed, Re
 from pivoting.sim.pipeline.bounded_control import applied
 from pivoting.sim.pipeline.law_control import LawSolver
 from pivoting.sim.pipeline.plan_log import Event, PlanLog
-from pivoting.sim.pipeline.stages import Answers, Desired, States, stacked
+from pivoting.sim.pipeline.stages import Answers, Desired, States, desired_values
 
 Array = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ class RecedingHorizonControl:
         for _ in range(2):
             now = self._horizons[0].replan(state, self._wanted[0], None)
         followed_motion(now, state, self._times)
-        self._motions[:] = stacked(state.orientation, np.zeros(3), np.zeros(3))
+        self._motions[:] = desired_values(state.orientation, np.zeros(3), np.zeros(3))
         self._law.solve(states, self._desired(0), out)
 
     def _desired(self, k: int) -> Desired:
@@ -89,7 +89,7 @@ class RecedingHorizonControl:
             return
         if now.outcome == "released":
             self._released.append(i)
-        self._motions[:, i] = stacked(*followed_motion(now, state, self._times))
+        self._motions[:, i] = desired_values(*followed_motion(now, state, self._times))
         tried = now.attempt
         change = tried.changes[-1] if tried.changes else np.nan
         self.log.residual[i, p], self.log.change[i, p], self.log.ms[i, p] = tried.residual, change, 1e3 * tried.seconds

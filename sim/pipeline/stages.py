@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.control_laws import Law
 from pivoting.controller.kernels.compiled_step import STATE
+from pivoting.controller.validate import frozen
 
 Array = NDArray[np.float64]
 # The columns of a state's values.
@@ -22,9 +23,7 @@ POSITION, ORIENTATION, VELOCITY, ANGULAR_VELOCITY = slice(0, 3), slice(3, 7), sl
 
 def _shown(values: Array) -> Array:
     """A view that cannot be written to: no stage changes what another has given."""
-    view = values.view()
-    view.flags.writeable = False
-    return view
+    return frozen(values.view())
 
 
 class States:
@@ -151,7 +150,7 @@ class Desired:
         return self.values[..., 7:]
 
 
-def stacked(orientation: Array, angular_velocity: Array, angular_acceleration: Array) -> Array:
+def desired_values(orientation: Array, angular_velocity: Array, angular_acceleration: Array) -> Array:
     """The values (..., 10) of `Desired` out of (..., 4), (..., 3) and (..., 3)."""
     return np.concatenate([orientation, angular_velocity, angular_acceleration], axis=-1)
 

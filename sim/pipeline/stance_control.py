@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from pivoting.controller.validate import frozen
 from pivoting.sim.pipeline.stages import Answers, Control, States
 from pivoting.sim.stances import Stance
 
@@ -51,9 +52,7 @@ class StanceControl:
 
     def by_world(self) -> NDArray[np.int8]:
         """(W, N) the same, read-only."""
-        out = self.stance.T.copy()
-        out.flags.writeable = False
-        return out
+        return frozen(self.stance.T.copy())
 
     def _decide(
         self, number: int, worlds: NDArray[np.intp], k: int, states: States, before: Array | None, out: Answers

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from pivoting.sim.viewing.live_loop import LiveLoop
 
-Array = np.ndarray
 SCENE_KEYS = ("mu", "mass", "gravity")  # of the world, and of what the controller believes if it is told
 CONTROL_KEYS = ("margin", "length")
 LABELS = {

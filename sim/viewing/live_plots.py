@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple
 
 import numpy as np
+from pivoting.models.length_unit import POWERS
 from pivoting.sim.drawing.colours import Colour
 from pivoting.sim.drawing.drawn_world import Array
 from pivoting.sim.judging.measures import predicted_slip
@@ -50,8 +51,8 @@ def plots_of(run: Run, world: int = 0) -> tuple[Array, list[Plot]]:
     planned = float((run.attached.controller.belief.contacts.mu / run.world.mu).max())
     names = WRENCH[run.truth.dim]
     moment = 3 if run.truth.dim == 3 else 2
-    scaled = [unit ** (1 if i < moment else 2) * values for i, values in enumerate(run.wrench[world, rows - 1].T)]
     units = ["N" if i < moment else "N m" for i in range(len(names))]
+    scaled = [unit ** POWERS[of] * values for of, values in zip(units, run.wrench[world, rows - 1].T, strict=True)]
     return run.time[rows], [
         Plot(
             "angle [deg]",

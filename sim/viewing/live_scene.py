@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from pivoting.controller.rotations import rotated
+from pivoting.controller.rotations import CONJUGATE, rotated
 from pivoting.models.rigid_body import initial_data, place
 from pivoting.sim.drawing.colours import BLOCK, EDGES, GREEN, GREY, ORANGE, PURPLE, RED, TABLE, TEAL, Colour
 from pivoting.sim.drawing.drawn_world import BOLD, THIN, UP, Array
@@ -105,8 +105,7 @@ class LiveScene:
     def grabbed(self, at: Array, pointer: Array) -> Grab:
         """What is held by a pointer that took the body at a point (3,), both in world axes."""
         run = self.world.run
-        conjugate = run.quaternion[0, -1] * [1.0, -1.0, -1.0, -1.0]
-        return Grab(rotated(conjugate, at - run.position[0, -1]), pointer)
+        return Grab(rotated(run.quaternion[0, -1] * CONJUGATE, at - run.position[0, -1]), pointer)
 
     def hit(self, origin: Array, direction: Array) -> Array | None:
         """(3,) where a ray meets what can move, world axes; None if it does not."""
