@@ -1,8 +1,10 @@
 """`simulate`: a closed-loop run, from a scenario to what is measured."""
 
+import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -17,7 +19,8 @@ from pivoting.sim.keep import KEEP
 from pivoting.sim.pipeline.apply_wrench import FreeWrench
 from pivoting.sim.pipeline.bounded_control import BoundedControl
 from pivoting.sim.pipeline.contact_log import ContactLog
-from pivoting.sim.pipeline.log import Log
+from pivoting.sim.pipeline.law_control import LawControl
+from pivoting.sim.pipeline.log import Log, empty_log, some_worlds, worlds_first
 from pivoting.sim.pipeline.loop import Steps, run_steps
 from pivoting.sim.pipeline.own_control import OwnControlFunction
 from pivoting.sim.pipeline.plan_playback import PlanPlayback
@@ -33,6 +36,7 @@ from pivoting.sim.scenarios.shipped_scenarios import scenario
 from pivoting.sim.start_states import resting_depths, start_worlds
 
 Array = NDArray[np.float64]
+LANE = 64  # worlds that are worth a thread
 
 
 @overload
@@ -127,21 +131,47 @@ def run_worlds(
     Args:
         hearing: what gives MuJoCo's warnings, an `engine_log`.
     """
-    stages = stages_of(begun, handed.observe)
-    decided = decide(begun, stages, laws_of(begun, stages), handed.control, open_loop)
-    batch = start_batch(begun, decided)
-    start = start_of(batch)
-    apply = FreeWrench(batch, begun.belief.attached.controller.belief.source.map, begun.world.truth.index)
+    decided = _decided(begun, handed, open_loop)
+    bounds = _lanes(begun.setting.worlds) if _plain(decided, handed) else [(0, begun.setting.worlds)]
+    log, lanes, starts = new_log(begun, decided), [], []
+    for first, last in bounds:
+        part = begun.part(first, last - first)
+        own = decided if len(bounds) == 1 else _decided(part, handed, open_loop)
+        batch = start_batch(part, own, threads=1 if len(bounds) > 1 else 0)
+        starts.append(start_of(batch))
+        apply = FreeWrench(batch, begun.belief.attached.controller.belief.source.map, begun.world.truth.index)
+        plant = Plant(batch, begun.world.sensors)
+        lanes.append(steps_of(part, own, plant, apply, some_worlds(log, first, last)))
     with hearing as warned:
-        log, wall_s = run_steps(steps_of(begun, decided, Plant(batch, begun.world.sensors), apply), progress)
-    return kept(begun, decided, (start, log, wall_s), (*begun.world.warned, *warned), handed.names)
+        wall_s = run_steps(lanes, progress)
+    log.control_ns[:] = sum(lane.log.control_ns for lane in lanes)
+    qpos, qvel = (frozen(np.concatenate(values)) for values in zip(*starts, strict=True))
+    made = (qpos, qvel), worlds_first(log), wall_s
+    return kept(begun, decided, made, (*begun.world.warned, *warned), handed.names)
 
 
-def start_batch(begun: Begun, decided: Decided) -> Batch:
-    """The worlds where they start."""
+def _decided(begun: Begun, handed: Handed, open_loop: bool) -> Decided:
+    """What decides in these worlds."""
+    stages = stages_of(begun, handed.observe)
+    return decide(begun, stages, laws_of(begun, stages), handed.control, open_loop)
+
+
+def _plain(decided: Decided, handed: Handed) -> bool:
+    """Whether Python has little to do at a step: no plan is made, and no function of the user's own is called."""
+    return isinstance(decided.control, LawControl) and handed.observe is None
+
+
+def _lanes(worlds: int) -> list[tuple[int, int]]:
+    """The first and one past the last world of each part that a processor of its own steps."""
+    parts = max(1, min(os.cpu_count() or 1, worlds // LANE))
+    return list(pairwise(worlds * part // parts for part in range(parts + 1)))
+
+
+def start_batch(begun: Begun, decided: Decided, threads: int = 1) -> Batch:
+    """The worlds where they start; `threads`: that MuJoCo steps them with, 0 for as many as there are processors."""
     world, controllers = begun.world, begun.belief.controllers
     seed, worlds, first = begun.setting[:3]
-    batch = Batch(world.model, worlds, nthread=1 if worlds == 1 else 0, persistent=True)
+    batch = Batch(world.model, worlds, nthread=1 if worlds == 1 else threads, persistent=True)
     draws = np.random.Generator(np.random.PCG64(seed).advance(first))  # a number for each world
     errors = draws.uniform(-1.0, 1.0, worlds)
     depths = resting_depths(world, controllers, decided.per_step, begun.told) if begun.case.chosen else np.zeros(1)
@@ -154,14 +184,22 @@ def start_of(batch: Batch) -> tuple[Array, Array]:
     return frozen(np.array(batch.bind("qpos"))), frozen(np.array(batch.bind("qvel")))
 
 
-def steps_of(begun: Begun, decided: Decided, plant: Plant, apply: FreeWrench) -> Steps:
-    """The steps that a run is to make, from the states that the plant has."""
-    world = begun.world
-    table, counts = matrix(world.truth.table), (begun.steps, plant.worlds)
-    contacts = ContactLog(world.declared, world.contact_rows, table, world.sensors, *counts)
+def new_log(begun: Begun, decided: Decided) -> Log:
+    """The log of all worlds and steps, yet to be written."""
     nw, _ = begun.belief.attached.controller.widths
-    widths = nw, len(world.declared.points) * world.truth.dim
-    return Steps(plant, decided.stages, decided.control, apply, contacts, begun.steps, widths)
+    declared = len(begun.world.declared.points)
+    widths = nw, declared * begun.world.truth.dim
+    return empty_log(begun.steps, begun.setting.worlds, widths, declared, decided.stages)
+
+
+def steps_of(begun: Begun, decided: Decided, plant: Plant, apply: FreeWrench, log: Log) -> Steps:
+    """The steps that a run is to make, from the states that the plant has, written to the log of its worlds."""
+    world = begun.world
+    table = matrix(world.truth.table)
+    contacts = ContactLog(
+        world.declared, world.contact_rows, table, world.sensors, plant.worlds, log.contacts, log.held
+    )  # fmt: skip
+    return Steps(plant, decided.stages, decided.control, apply, contacts, log)
 
 
 def kept(

@@ -29,7 +29,7 @@ for announce in before_compiling:
 
 _common: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
 
-kernel = njit(cache=CACHED, **_common)
+kernel = njit(cache=CACHED, nogil=True, **_common)  # worlds are stepped by several threads
 subroutine = register_jitable(no_cpython_wrapper=True, **_common)
 
 

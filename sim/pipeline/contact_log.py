@@ -7,35 +7,48 @@ from pivoting.sim.contact_sensing import ContactReadings, Declared, sort_contact
 from pivoting.sim.judging.predicted_slip import RowEffects, RowNumbers, Sums
 
 Array = NDArray[np.float64]
+READINGS = len(ContactReadings._fields)
 BLOCK = 256  # worlds times steps whose contacts are sorted at once: what stays in the caches
 
 
 class ContactLog:
-    """Sorts the contacts of every step, some steps at once: what MuJoCo lists of them all would fill the memory."""
+    """Sorts the contacts of every step into the log, some steps at once.
+
+    Args:
+        sensors: where the readings of each are, see `models.sensors.instrument`.
+        worlds: W.
+        readings, held: of the log, (N, W, ...), in which they are written.
+    """
 
     def __init__(
         self,
         declared: Declared,
         rows: ContactRows | None,
         axes: Array,
-        where: dict[str, slice],
-        steps: int,
+        sensors: dict[str, slice],
         worlds: int,
+        readings: ContactReadings,
+        held: RowEffects,
     ):
-        K = len(declared.points)
-        places = [(where[key].start, where[key].stop) for key in ("contacts", "touching")]
+        K, self.most = len(declared.points), max(1, BLOCK // worlds)
+        places = [(sensors[key].start, sensors[key].stop) for key in ("contacts", "touching")]
         known = None if rows is None else tuple(RowNumbers.of(rows, axes))
         self._with = *places, tuple(declared), known, np.empty((K, 3)), np.empty(K), tuple(Sums.of(K))
-        self.readings = ContactReadings(
-            *(np.empty((steps, worlds, *rest)) for rest in ((K, 3), (), (), (), ())),
-        )
-        self.held = RowEffects(
-            np.full((steps, worlds, K, 2), np.nan), np.zeros((steps, worlds, K)), np.zeros((steps, worlds, K), np.bool_)
-        )
+        self._kept = (*readings, *held)
+        # contiguous, as the kernel takes them, whichever worlds of the log they are
+        self._block = tuple(np.empty((self.most, worlds, *values.shape[2:]), values.dtype) for values in self._kept)
 
     def sort(self, first: int, poses: Array, sensed: Array) -> None:
-        """Sort the contacts (B, W, sensors) of the steps from `first` on, that began at the states (B, W, sensors)."""
-        now = slice(first, first + len(sensed))
+        """Sort the contacts (B, W, sensors) of the steps from `first` on, that began at the states (B, W, 7 or more).
+
+        B is at most `most`.
+        """
+        steps = len(sensed)
         contacts, touching, declared, rows, *scratch = self._with
-        readings, held = (tuple(values[now] for values in kept) for kept in (self.readings, self.held))
-        sort_contacts(sensed, contacts, touching, poses, declared, rows, *scratch, readings, held)
+        block = [values[:steps] for values in self._block]
+        sort_contacts(
+            sensed, contacts, touching, np.ascontiguousarray(poses), declared, rows, *scratch,
+            tuple(block[:READINGS]), tuple(block[READINGS:]),
+        )  # fmt: skip
+        for kept, values in zip(self._kept, block, strict=True):
+            kept[first : first + steps] = values

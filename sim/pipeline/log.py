@@ -40,16 +40,14 @@ class Log(NamedTuple):
     control_ns: Array
 
 
-def empty_log(
-    steps: int, worlds: int, widths: tuple[int, int], contacts: tuple[ContactReadings, RowEffects], stages: Any
-) -> Log:
+def empty_log(steps: int, worlds: int, widths: tuple[int, int], contacts: int, stages: Any) -> Log:
     """The log of a run that begins.
 
     Args:
-        widths: nw and K d.  contacts: where the contacts are kept.  stages: `Stages`, for what they change is kept.
+        widths: nw and K d.  contacts: K, that are declared.  stages: `Stages`, for what they change is kept.
     """
     nw, n = widths
-    both = (steps, worlds)
+    both, K = (steps, worlds), contacts
     return Log(
         states=np.empty((steps + 1, worlds, STATE)),
         measured=np.empty((*both, STATE)) if stages.sense else None,
@@ -57,24 +55,29 @@ def empty_log(
         answers=Answers.empty(both, nw, n),
         acting=np.empty((*both, nw)) if stages.actuate else None,
         wrench_world=np.empty((*both, 6)),
-        contacts=contacts[0],
-        held=contacts[1],
+        contacts=ContactReadings(*(np.empty((*both, *rest)) for rest in ((K, 3), (), (), (), ()))),
+        held=RowEffects(np.full((*both, K, 2), np.nan), np.zeros((*both, K)), np.zeros((*both, K), np.bool_)),
         control_ns=np.empty(steps),
     )
 
 
+def some_worlds(log: Log, first: int, last: int) -> Log:
+    """Worlds `first` to `last` - 1 of a log that has (step, world) first, as views; their times are their own."""
+    return _cut(log, (slice(None), slice(first, last)))._replace(control_ns=np.empty(len(log.control_ns)))
+
+
 def some_steps(log: Log, first: int, last: int) -> Log:
     """Steps `first` to `last` - 1 of a log that has (step, world) first, with the states around them."""
+    return _cut(log, (slice(first, last),))._replace(states=log.states[first : last + 1])
 
-    def cut(values: Any, most: int = last) -> Any:
-        if values is None or isinstance(values, int):
-            return values
-        if isinstance(values, tuple):
-            return type(values)(*(cut(value) for value in values))
-        return values[first:most]
 
-    within = {name: cut(values) for name, values in log._asdict().items()}
-    return log._replace(**{**within, "states": cut(log.states, last + 1)})
+def _cut(values: Any, where: tuple[slice, ...]) -> Any:
+    """These places of an array, or of all arrays of a named tuple."""
+    if values is None or isinstance(values, int):
+        return values
+    if isinstance(values, tuple):
+        return type(values)(*(_cut(value, where) for value in values))
+    return values[where[: values.ndim]]
 
 
 def worlds_first(log: Log) -> Log:

@@ -1,6 +1,8 @@
 """The steps of a closed loop: sense, observe, control, actuate, apply, step; and what each of them gives is logged."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from threading import Event
 from time import perf_counter, perf_counter_ns
 
 import numpy as np
@@ -9,8 +11,8 @@ from pivoting.controller.kernels.compilation import first_calls
 from pivoting.controller.kernels.compiled_step import STATE
 from pivoting.controller.validate import fail
 from pivoting.sim.pipeline.apply_wrench import FreeWrench
-from pivoting.sim.pipeline.contact_log import BLOCK, ContactLog
-from pivoting.sim.pipeline.log import Log, empty_log, worlds_first
+from pivoting.sim.pipeline.contact_log import ContactLog
+from pivoting.sim.pipeline.log import Log
 from pivoting.sim.pipeline.plant import Plant
 from pivoting.sim.pipeline.stages import Answers, Control, Stages, States
 
@@ -18,14 +20,13 @@ Array = NDArray[np.float64]
 
 
 class Steps:
-    """The steps of a run, some at a time: what each of its stages gives is logged.
+    """The steps of some worlds, some at a time: what each of the stages gives is logged.
 
     Args:
-        steps: how many there may be, N.
-        widths: nw and K d.
+        log: of all N steps of these worlds, with (step, world) first, in which they are written.
 
     Attributes:
-        log: of all N steps, with (step, world) first; those beyond `made` are yet to be written.
+        log: as given; steps beyond `made` are yet to be written.
         made: how many steps were made.
     """
 
@@ -36,12 +37,11 @@ class Steps:
         control: Control,
         apply: FreeWrench,
         contacts: ContactLog,
-        steps: int,
-        widths: tuple[int, int],
+        log: Log,
     ):
         self._plant, self._stages, self._control, self._apply, self._contacts = plant, stages, control, apply, contacts
-        self.log, self.made = empty_log(steps, plant.worlds, widths, (contacts.readings, contacts.held), stages), 0
-        self._block = np.empty((max(1, min(steps, BLOCK // plant.worlds)), *plant.sensed.shape))
+        self.log, self.made = log, 0
+        self._block = np.empty((min(len(log.control_ns), contacts.most), *plant.sensed.shape))
         self._before: Array | None = None
         self.log.states[0] = plant.sensed[:, :STATE]
 
@@ -86,19 +86,41 @@ class Steps:
         self.made, self._before = last, before
 
 
-def run_steps(steps: Steps, progress: Callable[[int, int], None] | None) -> tuple[Log, float]:
-    """Make all steps.
+def run_steps(lanes: Sequence[Steps], progress: Callable[[int, int], None] | None) -> float:
+    """Make all steps of all worlds, whose parts are stepped at the same time.
 
     Args:
-        progress: see `Steps.make`.
+        lanes: of the parts; what they call, MuJoCo and the kernels, runs without the interpreter's lock.
+        progress: see `Steps.make`; it is called from this thread.
 
     Returns:
-        The log, and the time that it took [s].
+        The time that it took [s].
     """
-    steps.prepare()  # compiled before it is timed
+    for steps in lanes:
+        steps.prepare()  # compiled before it is timed
     start = perf_counter()
-    steps.make(len(steps.log.control_ns), progress)
-    return worlds_first(steps.log), perf_counter() - start
+    every, stop, others = len(lanes[0].log.control_ns), Event(), list[Future[None]]()
+
+    def unless_stopped(done: int, of: int) -> None:
+        if stop.is_set():
+            raise CancelledError  # another lane has failed, whose error is raised
+
+    def unless_failed(done: int, of: int) -> None:
+        for other in others:
+            if other.done():
+                other.result()
+        if progress is not None:
+            progress(done, of)
+
+    with ThreadPoolExecutor(len(lanes)) as pool:
+        try:
+            others += [pool.submit(steps.make, every, unless_stopped) for steps in lanes[1:]]
+            lanes[0].make(every, unless_failed)
+            for other in others:
+                other.result()
+        finally:  # after an error, or an interrupt, which only this thread gets
+            stop.set()
+    return perf_counter() - start
 
 
 def _seen(k: int, states: States, before: Array | None, stages: Stages, log: Log) -> States:

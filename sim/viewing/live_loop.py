@@ -24,7 +24,7 @@ from pivoting.sim.run import Run
 from pivoting.sim.run_setup import on_reference, set_up
 from pivoting.sim.scenario_control import decide, laws_of, stages_of
 from pivoting.sim.scenarios.scenario import Scenario
-from pivoting.sim.simulation import kept, start_batch, start_of, steps_of
+from pivoting.sim.simulation import kept, new_log, start_batch, start_of, steps_of
 from pivoting.sim.start_states import Samples
 from pivoting.sim.viewing.later_references import Redirected, from_now
 from pivoting.sim.world import World
@@ -98,7 +98,8 @@ class LiveLoop:
         self._begun = on_reference(self._whole, reference, seconds)
         self._decided = decide(self._begun, self._stages, self._laws)
         self._start = start_of(self._batch)
-        self._steps = steps_of(self._begun, self._decided, self._plant, self._apply)
+        log = new_log(self._begun, self._decided)
+        self._steps = steps_of(self._begun, self._decided, self._plant, self._apply, log)
         self._steps.prepare()
         self._wall_s = 0.0
 

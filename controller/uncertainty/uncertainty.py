@@ -1,0 +1,189 @@
+"""The set in which the world is: honest bounds on what the controller does not know."""
+
+from dataclasses import dataclass, fields, replace
+from itertools import product
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pivoting.controller.validate import Array, array, fail, frozen, number
+
+SHOVE_SECONDS = 0.05  # over which a shove is spread, unless it is said otherwise [s]
+
+
+class Interval(NamedTuple):
+    """All numbers from `low` to `high`, both among them."""
+
+    low: float
+    high: float
+
+    @property
+    def middle(self) -> float:
+        """Halfway between the two."""
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def half(self) -> float:
+        """Half the width."""
+        return 0.5 * (self.high - self.low)
+
+    def at(self, share: float) -> float:
+        """The number at this share of the way from `low` to `high`, to the last bit at both ends."""
+        return self.high if share == 1.0 else self.low + share * (self.high - self.low)
+
+    def scaled(self, scale: float) -> "Interval":
+        """The interval about the same middle, `scale` times as wide."""
+        return Interval(self.middle - scale * self.half, self.middle + scale * self.half)
+
+
+class Member(NamedTuple):
+    """One world of the set.
+
+    Attributes:
+        mass: [kg].  com: (d,) from where the controller takes the CoM to be, object axes [m].
+        inertia: factor on the believed inertia about the CoM.  mu: friction coefficient; None: as believed.
+    """
+
+    mass: float
+    com: Array
+    inertia: float
+    mu: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """The set of worlds in which a guarantee has to hold: independent intervals of what is not known exactly.
+
+    A number stands for the interval of that number alone; for `com`, `theta` and `omega`, where the controller believes
+    in 0, and for `shove`, it stands for the greatest deviation either way.
+
+    Attributes:
+        mass: of the object [kg].
+        com: (d, 2) the true centre of mass, from the point of the body that the controller takes for it, at which its
+            wrench acts; object axes [m].
+        inertia: factor on the inertia about the centre of mass that is believed.
+        mu: friction coefficient of every contact; None: as believed. Only the lower bound matters to a grip.
+        shove: impulse of a shove at the true centre of mass, per true kg, in any direction [N s/kg].
+        shove_seconds: over which a shove is spread at least [s].
+        theta: error of the measured orientation about any axis [rad].
+        omega: error of the measured angular velocity about any axis [rad/s].
+
+    Raises:
+        ValueError: an interval that is empty, not finite, or of values that no world has; it is named.
+    """
+
+    mass: Interval
+    com: Array
+    inertia: Interval
+    mu: Interval | None
+    shove: Interval
+    shove_seconds: float
+    theta: Interval
+    omega: Interval
+
+    def __init__(
+        self,
+        *,
+        mass: ArrayLike,
+        com: ArrayLike = 0.0,
+        inertia: ArrayLike = 1.0,
+        mu: ArrayLike | None = None,
+        shove: ArrayLike = 0.0,
+        shove_seconds: float = SHOVE_SECONDS,
+        theta: ArrayLike = 0.0,
+        omega: ArrayLike = 0.0,
+        dim: int | None = None,
+    ):
+        """The set; `dim`: 2 in the plane or 3 in space, needed where `com` is one interval for all axes."""
+        put = object.__setattr__
+        put(self, "mass", _positive("mass", mass, "kg"))
+        put(self, "com", _box(com, dim))
+        put(self, "inertia", _positive("inertia", inertia, ""))
+        put(self, "mu", None if mu is None else _positive("mu", mu, ""))
+        put(self, "shove", _about_zero("shove", shove))
+        put(self, "shove_seconds", number("shove_seconds", shove_seconds, above=0.0, unit="s"))
+        put(self, "theta", _about_zero("theta", theta))
+        put(self, "omega", _about_zero("omega", omega))
+
+    @property
+    def dim(self) -> int:
+        """2 in the plane, 3 in space."""
+        return len(self.com)
+
+    @property
+    def nominal(self) -> Member:
+        """The member in the middle of all intervals."""
+        return self.at([0.5] * self.unknowns)
+
+    @property
+    def unknowns(self) -> int:
+        """How many numbers tell one member: mass, inertia, mu and d coordinates of the centre of mass."""
+        return 3 + self.dim
+
+    def at(self, shares: ArrayLike) -> Member:
+        """The member at these shares (unknowns,) of the way through the intervals, of mass, inertia, mu and com."""
+        mass, inertia, mu, *com = array("shares", shares, (self.unknowns,)).tolist()
+        return Member(
+            self.mass.at(mass),
+            frozen(np.array([Interval(*row).at(share) for row, share in zip(self.com, com, strict=True)])),
+            self.inertia.at(inertia),
+            None if self.mu is None else self.mu.at(mu),
+        )
+
+    def vertices(self) -> list[Member]:
+        """All members at the ends of their intervals; what is known exactly has one end."""
+        widths = [self.mass.half, self.inertia.half, self.mu.half if self.mu else 0.0, *np.ptp(self.com, axis=1)]
+        return [self.at(ends) for ends in product(*((0.0, 1.0) if width > 0.0 else (0.0,) for width in widths))]
+
+    def scaled(self, scale: float) -> Self:
+        """The set about the same nominal member, `scale` times as wide in every direction, as far as worlds exist.
+
+        Args:
+            scale: >= 0; 0 leaves the nominal member alone.
+        """
+        factor = number("scale", scale, at_least=0.0)
+        changed = {
+            each.name: getattr(self, each.name).scaled(factor)
+            for each in fields(self)
+            if isinstance(getattr(self, each.name), Interval)
+        }
+        middle, half = self.com.mean(axis=1), 0.5 * np.ptp(self.com, axis=1)
+        com = np.column_stack([middle - factor * half, middle + factor * half])
+        return replace(self, **changed, com=com)
+
+
+def _positive(name: str, value: ArrayLike, unit: str) -> Interval:
+    """An interval of numbers > 0."""
+    interval = _interval(name, value)
+    if interval.low <= 0.0:
+        raise fail(name, value, "an interval (low, high) of numbers > 0" + f" [{unit}]" * bool(unit))
+    return interval
+
+
+def _about_zero(name: str, value: ArrayLike) -> Interval:
+    """An interval with 0 in it; a number stands for the greatest deviation either way."""
+    ends = np.asarray(value)
+    interval = _interval(name, np.array([-ends, ends]) if ends.ndim == 0 else value)
+    if not interval.low <= 0.0 <= interval.high:
+        raise fail(name, value, "a number >= 0, or an interval (low, high) with 0 in it")
+    return interval
+
+
+def _box(value: ArrayLike, dim: int | None) -> Array:
+    """(d, 2) of one interval for all axes, or one for each."""
+    if np.ndim(value) == 2:
+        return frozen(np.array([_about_zero("com", row) for row in array("com", value, (dim, 2))]))
+    if dim not in (2, 3):
+        raise fail("dim", dim, "2 or 3, where com is one interval for all axes")
+    return frozen(np.array([_about_zero("com", value)] * dim))
+
+
+def _interval(name: str, value: ArrayLike) -> Interval:
+    """An interval, or a number as one of no width."""
+    if np.ndim(value) == 0:
+        only = number(name, value)  # type: ignore[arg-type]
+        return Interval(only, only)
+    low, high = array(name, value, (2,)).tolist()
+    if low > high:
+        raise fail(name, value, "(low, high) with low <= high")
+    return Interval(low, high)
