@@ -44,6 +44,7 @@ bench: .venv/.peers  ## timings, against peers (the extra [bench], 300 MB), into
 evidence: $(STAMP)  ## random problems by the hundred thousand, 256 worlds of every scenario
 	$(BIN)/python benchmarks/evidence.py --json benchmarks/results/evidence.json
 	$(BIN)/python benchmarks/evidence_space.py --json benchmarks/results/evidence_space.json
+	PIVOTING_PROBLEMS=20000 $(BIN)/python -m pytest -q tests/test_cones.py tests/test_solvers.py
 
 # How fast each formulation can pivot, what a horizon saves, and how short an arc can be within bounds: docs/formulations.md.
 study: $(STAMP)  ## how fast each formulation can pivot, and what a horizon saves

@@ -1,5 +1,6 @@
 """Random problems with any number of contacts, degenerate sets among them, as arrays for compiled batches."""
 
+import os
 from typing import NamedTuple
 
 import clarabel
@@ -14,6 +15,8 @@ from pivoting.controller.kernels.workspace import opened, workspace
 from pivoting.controller.kkt_residual import kkt_residual
 from scipy import sparse
 
+PROBLEMS = int(os.environ.get("PIVOTING_PROBLEMS", "5000"))  # that are drawn; `make evidence` asks for 20,000
+RARE = 3 * PROBLEMS // 200  # of them, that each piece of the cone is to be met in at least
 SETS = ("scattered", "line", "point", "face", "plane", "edge")
 PIECES = ("inside", "edge", "floor", "rim", "apex")
 

@@ -6,22 +6,23 @@ from pivoting.controller import Solution, SolveError, WrenchProblem, methods, so
 from pivoting.errors import PivotingError
 
 from tests.conftest import random_problem
+from tests.draws import PROBLEMS, RARE
 
 J = np.array([[1.0, 0.0], [0.0, 1.0], [0.5, -0.5]])
 SHIPPED = ("clarabel", "qp:clarabel", "qp:daqp", "qp:piqp", "qp:quadprog")  # with the project's own dependencies
 
 
-def test_closed_form_on_20000_random_problems() -> None:
+def test_closed_form_on_random_problems() -> None:
     """Residual <= 1e-11, objective within 1e-9 of an independent solver, no failure; every piece of the cone is met."""
     rng = np.random.default_rng(20)
     met = {"inside": 0, "edge": 0, "floor": 0, "apex": 0}
-    for _ in range(20_000):
+    for _ in range(PROBLEMS):
         problem = random_problem(rng)
         solution = solve(problem, tolerance=1e-11)
         other = solve(problem, "qp:quadprog", tolerance=1e-6)
         assert abs(solution.objective - other.objective) <= 1e-9 * solution.objective, problem
         met[piece(problem, solution)] += 1
-    assert min(met.values()) > 300, met
+    assert min(met.values()) > RARE, met
 
 
 def piece(problem: WrenchProblem, solution: Solution) -> str:

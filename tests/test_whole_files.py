@@ -76,6 +76,8 @@ def alarm() -> Iterator[Callable[[float], None]]:
     signal.signal(signal.SIGALRM, before)
 
 
+# a Ctrl-C between opening a file and its `with` leaves it to the garbage collector, which says so
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_a_run_is_saved_whole_or_not_at_all(tmp_path: Path, alarm: Callable[[float], None]) -> None:
     """Interrupted at many moments."""
     run: Run = simulate("snap-2d", worlds=4)

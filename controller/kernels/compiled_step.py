@@ -1,7 +1,7 @@
 """The compiled step of the loop: it makes, solves and certifies the wrench problem of every world."""
 
 import numpy as np
-from pivoting.controller.belief import Belief, BelievedObject, HeldContacts, WrenchSource
+from pivoting.controller.belief import HeldContacts
 from pivoting.controller.contacts import fill_jacobian
 from pivoting.controller.kernels.compilation import kernel, subroutine
 from pivoting.controller.kernels.interior_point import contact_wrench
@@ -25,21 +25,24 @@ STATE = 13  # numbers of a state: position (3), quaternion (4), velocity (3), an
 
 @kernel
 def state_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ignore[no-untyped-def]
-    """Write the problem at one state: R (3, 3), J (nw, K d) and the required wrench b (nw,)."""
+    """Write the problem at one state: R (3, 3), J (nw, K d) and the required wrench b (nw,).
+
+    Args:
+        belief: the values of a `Belief`.
+    """
+    moved, held, (wrench_map, _), law = belief
     fill_rotation(q, R)
-    fill_jacobian(R, belief.contacts, belief.source.map, J)
-    fill_required(R, q, omega, q_d, omega_d, alpha_d, belief, b)
+    fill_jacobian(R, held, wrench_map, J)
+    fill_required(R, q, omega, q_d, omega_d, alpha_d, moved, held.pivot, held.offset, wrench_map, law, b)
 
 
 @subroutine
-def belief_of(beliefs, i):  # type: ignore[no-untyped-def]
-    """The `Belief` of one world among those of `belief.for_worlds`."""
-    (mass, inertia, gravity), contacts, (wrench_map, Q_w), law = beliefs
-    points, offsets, frames, turning, pivot, offset, mu, f_min, force_map, Q_f = contacts
-    held = HeldContacts(
+def contacts_of(held, i):  # type: ignore[no-untyped-def]
+    """The `HeldContacts` of one world, among those of `belief.for_worlds`."""
+    points, offsets, frames, turning, pivot, offset, mu, f_min, force_map, Q_f = held
+    return HeldContacts(
         points[i], offsets[i], frames[i], turning, pivot[i], offset[i], mu[i], f_min[i], force_map, Q_f[i]
     )
-    return Belief(BelievedObject(mass[i], inertia[i], gravity[i]), held, WrenchSource(wrench_map, Q_w[i]), law)
 
 
 @kernel
@@ -64,16 +67,19 @@ def step_worlds(  # type: ignore[no-untyped-def]
             force (K d), contact axes; residual.
         status: (W,) int8, written: 0 solved, 1 inaccurate, 2 failed.
     """
-    each, belief = beliefs[0][0].shape[0], belief_of(beliefs, 0)
-    nw, last = belief.source.map.shape[0], out.shape[1] - 1
+    (masses, inertias, gravities), all_held, (wrench_map, weights), law = beliefs
+    each, nw, last = masses.shape[0], wrench_map.shape[0], out.shape[1] - 1
     R, J, heavier, root = own
     for i in range(states.shape[0]):
-        if each > 1:
-            belief = belief_of(beliefs, i)
-        Q_w, Q_f, mu, f_min = belief.source.Q_w, belief.contacts.Q_f, belief.contacts.mu, belief.contacts.f_min
+        mine = i % each
+        moved, held, Q_w = (masses[mine], inertias[mine], gravities[mine]), contacts_of(all_held, mine), weights[mine]
+        Q_f, mu, f_min = held.Q_f, held.mu, held.f_min
         j, b, wrench, force = i % desired.shape[0], out[i, :nw], out[i, nw : 2 * nw], out[i, 2 * nw : last]
         q, omega = states[i, 3:7], states[i, 10:13]
-        state_problem(belief, q, omega, desired[j, :4], desired[j, 4:7], desired[j, 7:10], R, J, b)
+        fill_rotation(q, R)
+        fill_jacobian(R, held, wrench_map, J)
+        q_d, omega_d, alpha_d = desired[j, :4], desired[j, 4:7], desired[j, 7:10]
+        fill_required(R, q, omega, q_d, omega_d, alpha_d, moved, held.pivot, held.offset, wrench_map, law, b)
         for row in range(nw):
             b[row] -= external[i % external.shape[0], row]
         ball, multiplier, Q = -1, 0.0, Q_w

@@ -6,17 +6,16 @@ from pivoting.controller.rotations import cross, into, rotation_error
 
 
 @subroutine
-def fill_required(R, q, omega, q_d, omega_d, alpha_d, belief, out):  # type: ignore[no-untyped-def]
+def fill_required(R, q, omega, q_d, omega_d, alpha_d, moved, pivot, offset, wrench_map, law, out):  # type: ignore[no-untyped-def]
     """Write the required wrench (nw,), object axes, which contacts and applied wrench must make together.
 
     Args:
         R, q: (3, 3), (4,) orientation, object to world; omega: (3,) angular velocity, world axes [rad/s].
         q_d, omega_d, alpha_d: the reference's orientation, angular velocity and acceleration, likewise.
-        belief: the object, the law and the contacts' mean, a `Belief`.
+        moved, law: of a `Belief`.  pivot, offset: of its contacts.  wrench_map: (nw, 6), see `Space`.
     """
-    feedforward, kp, kd, c = belief.law
-    mass, inertia, gravity = belief.object
-    pivot, offset, wrench_map = belief.contacts.pivot, belief.contacts.offset, belief.source.map
+    feedforward, kp, kd, c = law
+    mass, inertia, gravity = moved
     e0, e1, e2 = rotation_error(q, q_d)
     w0, w1, w2 = into(R, omega[0], omega[1], omega[2])
     v0, v1, v2 = into(R, omega_d[0], omega_d[1], omega_d[2])
