@@ -60,23 +60,43 @@ class WrenchSource(NamedTuple):
     Q_w: Array
 
 
+class BelievedSet(NamedTuple):
+    """What the controller does not know, see `Uncertainty`; of friction and of errors of theta the contacts tell.
+
+    Attributes:
+        mass: (2,) [kg].  com: (3, 2) from the believed CoM, object axes [m].  inertia: (2,) factors.
+        about_contact: whether these are on the inertia about the contact.
+        push: greatest disturbance, in any direction, at the true CoM, per true mass [N/kg].
+        spin: greatest error of the measured angular velocity [rad/s].
+    """
+
+    mass: Array
+    com: Array
+    inertia: Array
+    about_contact: bool
+    push: float
+    spin: float
+
+
 class Belief(NamedTuple):
     """All that the compiled step has to know.
 
     Attributes:
         law: (feedforward, kp, kd, velocity_terms), see `Law`.
+        unknown: None where all is believed to be known.
     """
 
     object: BelievedObject
     contacts: HeldContacts
     source: WrenchSource
     law: tuple[float, float, float, float]
+    unknown: BelievedSet | None = None
 
 
-SHARED = ("turning", "force_map", "map")  # arrays that are the same for all worlds
+SHARED = ("turning", "force_map", "map", "about_contact")  # arrays that are the same for all worlds
 
 
-def for_worlds(beliefs: Sequence[Belief]) -> tuple[tuple[object, ...], ...]:
+def for_worlds(beliefs: Sequence[Belief]) -> tuple[tuple[object, ...] | None, ...]:
     """The beliefs of W worlds, or one that they share, as `step_worlds` takes them.
 
     Returns:
@@ -94,12 +114,13 @@ def for_worlds(beliefs: Sequence[Belief]) -> tuple[tuple[object, ...], ...]:
                 "one with the law of controller[0], and as many contacts of the same kind",
             )
     stacked = (_stacked(parts) for parts in ([belief[part] for belief in beliefs] for part in range(3)))
-    return (*stacked, first.law)
+    return (*stacked, first.law, None if first.unknown is None else _stacked([belief.unknown for belief in beliefs]))
 
 
 def _kind(belief: Belief) -> list[object]:
-    """What the beliefs of one fleet have in common: the shapes of all arrays, and which contacts turn."""
-    return [*(np.shape(value) for part in belief[:3] for value in part), *belief.contacts.turning.tolist()]
+    """What the beliefs of one fleet have in common: the shapes of all arrays, which contacts turn, of what set."""
+    of = None if belief.unknown is None else belief.unknown.about_contact
+    return [*(np.shape(value) for part in belief[:3] for value in part), *belief.contacts.turning.tolist(), of]
 
 
 def _stacked(parts: Sequence[Any]) -> tuple[object, ...]:

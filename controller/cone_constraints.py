@@ -49,12 +49,15 @@ class ConeConstraints(NamedTuple):
                 sides[begin : begin + len(side)] = side + rate * (rows @ before)
 
 
-def friction_limits(mu: Array, floors: Array, dim: int, edges: int = 0) -> ConeConstraints:
+def friction_limits(mu: Array, floors: Array, dim: int, edges: int = 0, apex: Array | None = None) -> ConeConstraints:
     """The truncated friction cones |f_t| <= mu f_n, f_n >= floor of K contacts, as constraints on forces (K d,).
 
     For each contact the linear rows contain its floor and then the flat sides of its cone. In the plane a cone has two
     sides. In space they are the faces of the inscribed pyramid with this number of `edges`; with 0 edges the round cone
-    itself is a second-order cone.
+    itself is a second-order cone. The sides of all further cones come last.
+
+    Args:
+        apex: (V, K, d) of the V cones of each contact [N]; None: one at 0.
     """
     K, second_order = len(mu), dim == 3 and not edges
     faces = np.zeros((0, 2))
@@ -74,9 +77,15 @@ def friction_limits(mu: Array, floors: Array, dim: int, edges: int = 0) -> ConeC
         if second_order:
             cone[dim * i, normal] = -friction
             cone[dim * i + 1, normal - 2] = cone[dim * i + 2, normal - 1] = -1.0
+    tips = np.zeros((1, K * dim)) if apex is None else apex.reshape(len(apex), K * dim)
+    sides = np.arange(len(side)) % tall > 0
+    side[sides] = linear[sides] @ tips[0]
+    linear = np.concatenate([linear, *[linear[sides]] * (len(tips) - 1)])
+    side = np.concatenate([side, *(linear[: K * tall][sides] @ tip for tip in tips[1:])])
+    cone, cone_side = np.concatenate([cone] * len(tips)), np.concatenate([cone @ tip for tip in tips])
     still = np.zeros(len(linear), dtype=bool), np.zeros(len(cone), dtype=bool)
-    orders = (dim,) * K if second_order else ()
-    return ConeConstraints(linear, side, still[0], cone, np.zeros(len(cone)), still[1], orders, False)
+    orders = (dim,) * K * len(tips) if second_order else ()
+    return ConeConstraints(linear, side, still[0], cone, cone_side, still[1], orders, False)
 
 
 def wrench_limits(bounds: WrenchBounds, nw: int, edges: int, unit: Array, h: float) -> ConeConstraints:

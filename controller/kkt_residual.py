@@ -13,7 +13,7 @@ from pivoting.controller.kernels.compilation import kernel, subroutine
 
 
 @kernel
-def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, pull, vertices=None, facets=None):  # type: ignore[no-untyped-def]
+def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, pull, linear=None, vertices=None, facets=None):  # type: ignore[no-untyped-def]
     """The relative KKT residual: the largest of those of equilibrium, friction cones, dual cones and duality gap.
 
     Each of the four is a backward error, relative to the sum of the absolute values of its terms (Oettli and Prager
@@ -25,6 +25,7 @@ def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, pull, vertices=None, facets=No
     Args:
         J: (nw, K d); b, w: (nw,); f: (K d,); Q_w: (nw, nw); Q_f: (K d, K d); mu (planned), f_min: (K,).
         pull: (2, nw) scratch, for Q_w w and |Q_w||w|.
+        linear: (K d,) q of a cost with q'f beside the squares; None: without.
         vertices, facets: (m, 2) of the polygon that replaces the unit disc, see `polygon`; None for the disc itself.
     """
     nw, n = J.shape
@@ -55,6 +56,9 @@ def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, pull, vertices=None, facets=No
             for i in range(n):
                 z += Q_f[j, i] * f[i]
                 abs_z += abs(Q_f[j, i] * f[i])
+            if linear is not None:  # a branch that the compiler decides
+                z += linear[j]
+                abs_z += abs(linear[j])
             for i in range(nw):
                 z -= J[i, j] * pull[0, i]
                 abs_z += abs(J[i, j]) * pull[1, i]
@@ -62,7 +66,7 @@ def kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, pull, vertices=None, facets=No
             gap += z * f[j]
             size_gap += abs_z * abs(f[j])
             if j < (c + 1) * dim - 1:
-                if facets is None:  # a branch that the compiler decides
+                if facets is None:  # likewise
                     f_t, z_t = np.hypot(f_t, f[j]), np.hypot(z_t, z)
                 elif j == c * dim:
                     f_0, z_0 = f[j], z

@@ -14,11 +14,13 @@ from numpy.typing import ArrayLike
 from pivoting.controller.belief import Belief, BelievedObject, HeldContacts, WrenchSource
 from pivoting.controller.contacts import Contact
 from pivoting.controller.control_laws import Body, Law
-from pivoting.controller.kernels.compiled_step import state_problem
-from pivoting.controller.kernels.workspace import workspace
+from pivoting.controller.kernels.compiled_step import state_cones, state_problem
+from pivoting.controller.kernels.workspace import guard_scratch, workspace
 from pivoting.controller.motion import Motion
 from pivoting.controller.plane_and_space import Space, space
 from pivoting.controller.rotations import IDENTITY, rotation_matrix
+from pivoting.controller.uncertainty.believed_set import believed_set, check_set, guarded_cones
+from pivoting.controller.uncertainty.uncertainty import Uncertainty
 from pivoting.controller.units import Units, lever, units
 from pivoting.controller.validate import Array, array, fail, number, positive_definite
 from pivoting.controller.wrench_problem import WrenchProblem, wrench_weight
@@ -36,6 +38,8 @@ class WrenchController:
         base: (4,) quaternion of the table in the world. In the plane theta is measured from it; in space only a
             `Horizon` uses it, for the axes of the table.
         margin: share of mu that is kept in reserve.
+        uncertainty: what is not known of the world: contact forces are to be in their cones for every member of this
+            set, in which `body` is one; None: all is as believed.
         Q_w, Q_f: weights of wrench (object axes) and contact forces. By default Q_w is `wrench_weight` with the
             distance from the CoM to the contacts as its length, plus the radius if the object rolls.
     """
@@ -46,6 +50,7 @@ class WrenchController:
     gravity: Array
     base: Array
     margin: float
+    uncertainty: Uncertainty | None
     Q_w: Array
     Q_f: Array
 
@@ -58,6 +63,7 @@ class WrenchController:
         *,
         base: ArrayLike = IDENTITY,
         margin: float = 0.0,
+        uncertainty: Uncertainty | None = None,
         Q_w: ArrayLike | None = None,
         Q_f: ArrayLike | None = None,
     ):
@@ -82,6 +88,9 @@ class WrenchController:
         weight = wrench_weight(dim, reach) if Q_w is None else Q_w
         put(self, "Q_w", positive_definite("Q_w", weight, 3 * dim - 3))
         put(self, "Q_f", positive_definite("Q_f", np.eye(n) if Q_f is None else Q_f, n))
+        put(self, "uncertainty", uncertainty)
+        if uncertainty is not None:
+            check_set(uncertainty, body, held)
 
     @cached_property
     def space(self) -> Space:
@@ -96,6 +105,12 @@ class WrenchController:
         points = np.array([here.lift(contact.point) for contact in self.contacts])
         frames = np.array([_lifted_frame(contact, here, table) for contact in self.contacts])
         offsets = -frames[:, :, 2] * np.array([[contact.radius] for contact in self.contacts])
+        mu = np.array([(1.0 - self.margin) * contact.mu for contact in self.contacts])
+        f_min, unknown = np.array([contact.f_min for contact in self.contacts]), None
+        gravity = self.gravity if self.gravity.size == 3 else here.lift(self.gravity)
+        if self.uncertainty is not None:
+            mu, f_min = guarded_cones(self.uncertainty, self.contacts, self.margin)
+            unknown = believed_set(self.uncertainty, self.body, gravity, here)
         held = HeldContacts(
             points=points,
             offsets=offsets,
@@ -103,14 +118,14 @@ class WrenchController:
             turning=np.array([contact.fixed_to == "object" for contact in self.contacts]),
             pivot=points.mean(axis=0),
             offset=offsets.mean(axis=0),
-            mu=np.array([(1.0 - self.margin) * contact.mu for contact in self.contacts]),
-            f_min=np.array([contact.f_min for contact in self.contacts]),
+            mu=mu,
+            f_min=f_min,
             force_map=np.ascontiguousarray(here.force_map),
             Q_f=np.array(self.Q_f),
         )
-        gravity = self.gravity if self.gravity.size == 3 else here.lift(self.gravity)
         moved = BelievedObject(float(self.body.mass), here.lift_inertia(self.body.inertia), gravity)
-        return Belief(moved, held, WrenchSource(here.wrench_map, np.array(self.Q_w)), self.law.coefficients)
+        source = WrenchSource(here.wrench_map, np.array(self.Q_w))
+        return Belief(moved, held, source, self.law.coefficients, unknown)
 
     @cached_property
     def units(self) -> Units:
@@ -126,7 +141,8 @@ class WrenchController:
     def workspace(self) -> tuple[tuple[Any, ...] | None, ...]:
         """Scratch of the compiled loop, one for each thread."""
         nw, n = len(self.Q_w), len(self.Q_f)
-        own = np.empty((3, 3)), np.empty((nw, n)), np.empty((nw, nw)), np.empty(6)
+        guard = None if self.uncertainty is None else guard_scratch(nw, len(self.contacts), self.space.dim)
+        own = np.empty((3, 3)), np.empty((nw, n)), np.empty((nw, nw)), np.empty(6), guard
         return own, *workspace(nw, len(self.contacts), self.space.dim)
 
     def jacobian(self, orientation: Array) -> Array:
@@ -146,18 +162,20 @@ class WrenchController:
                 of damped joints, about the CoM, object axes [N, N m].
         """
         target = Motion(state.orientation) if desired is None else desired
-        J, required = self._stated(self.space.lift_motion(state)[:2], self.space.lift_motion(target))
+        measured = self.space.lift_motion(state)[:2]
+        J, required = self._stated(measured, self.space.lift_motion(target))
+        held, floors, apex = self.belief.contacts, self.belief.contacts.f_min, None
+        if self.uncertainty is not None:
+            guard = guard_scratch(len(required), len(self.contacts), self.space.dim)
+            state_cones(self.belief, *(np.array(values) for values in measured), np.empty((3, 3)), required, guard)
+            apex, floors = guard[0].reshape(1, len(self.contacts), -1), guard[1]
         if external is not None:
             required -= array("external", external, required.shape)
+        # as it was given, where it is: (1 - margin) mu is to be the same to the last bit
+        mu = held.mu / (1.0 - self.margin) if self.uncertainty else [contact.mu for contact in self.contacts]
         return WrenchProblem(
-            J,
-            required,
-            [contact.mu for contact in self.contacts],
-            f_min=self.belief.contacts.f_min,
-            margin=self.margin,
-            Q_w=self.Q_w,
-            Q_f=self.Q_f,
-        )
+            J, required, mu, f_min=floors, margin=self.margin, Q_w=self.Q_w, Q_f=self.Q_f, apex=apex
+        )  # fmt: skip
 
     def _stated(self, measured: tuple[Array, ...], desired: tuple[Array, ...]) -> tuple[Array, Array]:
         """J (nw, K d) and the required wrench (nw,) at q, omega for q_d, omega_d, alpha_d, all in world axes."""

@@ -26,7 +26,7 @@ class StandardForm(NamedTuple):
 class WrenchProblem:
     """The problem of the smallest wrench w, together with contact forces f, that makes the required wrench.
 
-    min 1/2 w'Q_w w + 1/2 f'Q_f f  s.t.  J f + w = required, each contact force in its truncated friction cone.
+    min 1/2 w'Q_w w + 1/2 f'Q_f f  s.t.  J f + w = required, each contact force in its truncated friction cone(s).
 
     Balance, quasi-dynamic and dynamic pivoting are this one problem with different right-hand sides: `required` is
     -m g for balance and M a - m g for motion. In the plane nw = 3 and d = 2, in space nw = 6 and d = 3. Contact forces
@@ -34,6 +34,7 @@ class WrenchProblem:
     `required` are in the same frame, which is that of the object in the notes and in this package.
 
     The problem is always feasible: f = (0, f_min) is in the cones, and w = required - J f balances it (erratum 6).
+    Where forces have to be in the cones for every member of an uncertain set, the members' cones are moved: `apex`.
 
     Attributes:
         jacobian: (nw, K d) contact Jacobian J_c.
@@ -42,6 +43,8 @@ class WrenchProblem:
         f_min: (K,) least normal forces [N], >= 0.
         margin: share of each mu that is kept in reserve, in [0, 1): the cones have (1 - margin) mu.
         Q_w: (nw, nw) and Q_f: (K d, K d), symmetric positive definite weights.
+        apex: (V, K, d) where the apex of each contact's cone is, for V cones in all of which the force has to be [N];
+            one at 0 unless something is uncertain. The floor counts from 0 all the same.
 
     Raises:
         ValueError: an argument is not finite, has the wrong shape or is out of range; it is named with its value.
@@ -54,6 +57,7 @@ class WrenchProblem:
     margin: float
     Q_w: Array
     Q_f: Array
+    apex: Array
 
     def __init__(
         self,
@@ -65,6 +69,7 @@ class WrenchProblem:
         margin: float = 0.0,
         Q_w: ArrayLike | None = None,
         Q_f: ArrayLike | None = None,
+        apex: ArrayLike | None = None,
     ):
         J = array("jacobian", jacobian, (None, None))
         nw, n = J.shape
@@ -88,6 +93,10 @@ class WrenchProblem:
         put(self, "margin", number("margin", margin, at_least=0.0, below=1.0))
         put(self, "Q_w", positive_definite("Q_w", np.eye(nw) if Q_w is None else Q_w, nw))
         put(self, "Q_f", positive_definite("Q_f", np.eye(n) if Q_f is None else Q_f, n))
+        tips = array("apex", np.zeros((1, K, dim)) if apex is None else apex, (None, K, dim))
+        if len(tips) == 0:
+            raise fail("apex", tips, "of at least one cone for each contact")
+        put(self, "apex", tips)
 
     @property
     def dim(self) -> int:
@@ -113,11 +122,37 @@ class WrenchProblem:
         """The relative KKT residual of an answer, see `kkt_residual.kkt_residual`; nan if the answer is not finite.
 
         With `edges` > 0 it is the residual of the problem whose cones in space are replaced by inscribed pyramids.
+
+        Raises:
+            ValueError: of several cones at one contact, of which only who solves the problem knows the multipliers.
         """
         w, f = np.array(wrench, dtype=float), np.array(force, dtype=float).ravel()
-        stated = self.jacobian, self.required, self.Q_w, self.Q_f, self.mu_planned, self.f_min
         shape = self._pyramid(edges) if edges else ()
-        return float(kkt_residual(*stated, w, f, np.empty((2, w.size)), *shape))
+        if not self.moved:
+            stated = self.jacobian, self.required, self.Q_w, self.Q_f, self.mu_planned, self.f_min
+            return float(kkt_residual(*stated, w, f, np.empty((2, w.size)), None, *shape))
+        apex, moved = self.from_apex
+        return float(kkt_residual(*moved[:-1], w, f - apex, np.empty((2, w.size)), moved[-1], *shape))
+
+    @property
+    def moved(self) -> bool:
+        """Whether any cone's apex is not at 0."""
+        return len(self.apex) > 1 or bool(self.apex.any())
+
+    @cached_property
+    def from_apex(self) -> tuple[Array, tuple[Array, ...]]:
+        """The apex a (K d,), and the same problem in f - a: J, required, Q_w, Q_f, mu, floors and a linear cost.
+
+        Raises:
+            ValueError: there are several cones at one contact.
+        """
+        if len(self.apex) > 1:
+            raise fail("apex", self.apex, "one for each contact: with several, take the residual of the `Solution`")
+        a = self.apex[0].ravel()
+        floors = np.maximum(self.f_min - self.apex[0, :, -1], 0.0)
+        b, linear = self.required - self.jacobian @ a, self.Q_f @ a
+        data = self.jacobian, b, self.Q_w, self.Q_f, self.mu_planned, floors, linear
+        return a, tuple(np.array(values) for values in data)  # that may be written: kernels tell the two apart
 
     def _pyramid(self, edges: int) -> Polygon:
         if self.dim != 3:
@@ -127,7 +162,7 @@ class WrenchProblem:
     def standard_form(self, *, edges: int = 0) -> StandardForm:
         """The problem as the quadratic program of the notes, in x = (f, w).
 
-        For each contact, the rows of C are the floor and the sides of the cone. In the plane these are the right and
+        For each contact, the rows of C are the floor and the sides of the cone; those of further cones come last. In the plane these are the right and
         the left side. In space the cone is replaced by the inscribed pyramid with `edges` faces; an answer is then
         feasible for the cone but, in general, not optimal.
 
@@ -141,7 +176,7 @@ class WrenchProblem:
         nw, n = self.jacobian.shape
         P = np.zeros((n + nw, n + nw))
         P[:n, :n], P[n:, n:] = self.Q_f, self.Q_w
-        cones = friction_limits(self.mu_planned, self.f_min, self.dim, edges)
+        cones = friction_limits(self.mu_planned, self.f_min, self.dim, edges, self.apex)
         C = np.hstack([cones.linear, np.zeros((len(cones.linear), nw))])
         return StandardForm(P, np.hstack([self.jacobian, np.eye(nw)]), self.required, C, cones.linear_side)
 

@@ -162,7 +162,7 @@ def _closed_form(J, b, Q_w, Q_f, mu, f_min, residual, f, w, scratch):  # type: i
         reduce(J[i], b[i], Q_w[i], Q_f[i], work.H, work.h, work.x)
         work.piece[0] = spatial_force(work.H, work.h, mu[i, 0], f_min[i, 0], f)
         balancing_wrench(J[i], b[i], f, w)
-        polish(J[i], Q_w[i], Q_f[i], work.H, mu[i], f_min[i], work.axes, work.piece, f, w, work)
+        polish(J[i], Q_w[i], Q_f[i], work.H, mu[i], f_min[i], work.axes, work.piece, f, w, work, None)
         residual[i] = kkt_residual(J[i], b[i], Q_w[i], Q_f[i], mu[i], f_min[i], w, f, work.pull)
 
 

@@ -5,8 +5,9 @@ from pivoting.controller.belief import HeldContacts
 from pivoting.controller.contacts import fill_jacobian
 from pivoting.controller.kernels.compilation import kernel, subroutine
 from pivoting.controller.kernels.interior_point import contact_wrench
-from pivoting.controller.kernels.planar_closed_form import planar_wrench
+from pivoting.controller.kernels.planar_closed_form import planar_wrench, state_from_apex
 from pivoting.controller.kernels.required_wrench import fill_required
+from pivoting.controller.kernels.worst_planar_force import move_planar_cone
 from pivoting.controller.rotations import fill_rotation, turned
 from pivoting.controller.solution import FAILED, INACCURATE, SOLVED
 from pivoting.controller.wrench_bounds import (
@@ -30,10 +31,22 @@ def state_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ig
     Args:
         belief: the values of a `Belief`.
     """
-    moved, held, (wrench_map, _), law = belief
+    moved, held, (wrench_map, _), law, _ = belief
     fill_rotation(q, R)
     fill_jacobian(R, held, wrench_map, J)
     fill_required(R, q, omega, q_d, omega_d, alpha_d, moved, held.pivot, held.offset, wrench_map, law, b)
+
+
+@kernel
+def state_cones(belief, q, omega, R, b, guard):  # type: ignore[no-untyped-def]
+    """Write where all members of the believed set ask the cones to be, into `guard`, of `guard_scratch`.
+
+    Args:
+        belief: the values of a `Belief`, with a set.  b: (nw,) the required wrench.  R: (3, 3) scratch.
+    """
+    moved, held, (wrench_map, _), _, unknown = belief
+    fill_rotation(q, R)
+    return move_planar_cone(R, omega, b, moved, held, wrench_map, unknown, guard)
 
 
 @subroutine
@@ -43,6 +56,13 @@ def contacts_of(held, i):  # type: ignore[no-untyped-def]
     return HeldContacts(
         points[i], offsets[i], frames[i], turning, pivot[i], offset[i], mu[i], f_min[i], force_map, Q_f[i]
     )
+
+
+@subroutine
+def set_of(unknown, i):  # type: ignore[no-untyped-def]
+    """The values of the `BelievedSet` of one world, among those of `belief.for_worlds`."""
+    mass, com, inertia, about_contact, push, spin = unknown
+    return mass[i], com[i], inertia[i], about_contact, push[i], spin[i]
 
 
 @kernel
@@ -67,9 +87,9 @@ def step_worlds(  # type: ignore[no-untyped-def]
             force (K d), contact axes; residual.
         status: (W,) int8, written: 0 solved, 1 inaccurate, 2 failed.
     """
-    (masses, inertias, gravities), all_held, (wrench_map, weights), law = beliefs
+    (masses, inertias, gravities), all_held, (wrench_map, weights), law, unknown = beliefs
     each, nw, last = masses.shape[0], wrench_map.shape[0], out.shape[1] - 1
-    R, J, heavier, root = own
+    R, J, heavier, root, guard = own
     for i in range(states.shape[0]):
         mine = i % each
         moved, held, Q_w = (masses[mine], inertias[mine], gravities[mine]), contacts_of(all_held, mine), weights[mine]
@@ -80,16 +100,22 @@ def step_worlds(  # type: ignore[no-untyped-def]
         fill_jacobian(R, held, wrench_map, J)
         q_d, omega_d, alpha_d = desired[j, :4], desired[j, 4:7], desired[j, 7:10]
         fill_required(R, q, omega, q_d, omega_d, alpha_d, moved, held.pivot, held.offset, wrench_map, law, b)
+        if unknown is not None:
+            move_planar_cone(R, omega, b, moved, held, wrench_map, set_of(unknown, mine), guard)
         for row in range(nw):
             b[row] -= external[i % external.shape[0], row]
+        if unknown is not None:
+            state_from_apex(J, b, Q_f, f_min, guard)
         ball, multiplier, Q = -1, 0.0, Q_w
         for attempt in range(ATTEMPTS + 1):
             if bounds is not None:
                 fill_heavier(Stacked(*bounds), ball, multiplier, Q_w, heavier)
                 Q = heavier
             # Of what is None the compiler leaves the branch out, and all kernels that it calls.
-            if planar is not None:
+            if planar is not None and unknown is None:
                 residual = planar_wrench(J, b, Q, Q_f, mu, f_min, force, wrench, planar)
+            if planar is not None and unknown is not None:
+                residual = planar_wrench(J, guard[2], Q, Q_f, mu, guard[1], force, wrench, planar, guard[3])
             if several is not None:
                 residual = contact_wrench(J, b, Q, Q_f, mu, f_min, force, wrench, several)
             if bounds is None:
@@ -108,6 +134,9 @@ def step_worlds(  # type: ignore[no-untyped-def]
             multiplier = root[0]
             if attempt >= ATTEMPTS - 1 or not multiplier <= HEAVIEST * root[5]:  # out of reach: as without bounds
                 ball = -1
+        if unknown is not None:
+            for j in range(force.shape[0]):
+                force[j] += guard[0][j]
         out[i, last] = residual
         if not np.isfinite(residual):
             status[i] = FAILED

@@ -24,7 +24,7 @@ EXACT = 1e-13  # relative KKT residual at which nothing is left to improve
 
 
 @kernel
-def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no-untyped-def]
+def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch, linear=None):  # type: ignore[no-untyped-def]
     """Write the optimal contact forces f (n,) and wrench w (nw,), and return their relative KKT residual.
 
     One contact in space is solved in closed form and, if that is not exact, polished. The interior-point method solves
@@ -34,9 +34,14 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no
     Args:
         J: (nw, n); b: (nw,) [N, N m]; Q_w: (nw, nw); Q_f: (n, n); mu (planned), f_min [N]: (K,).
         scratch: of `workspace`.
+        linear: (n,) of the cost, see `kkt_residual`; None: without.
     """
     n, K, H, h, pull = f.shape[0], mu.shape[0], scratch[1][0], scratch[2][0], scratch[3][1:]
     best, piece, size = np.inf, INSIDE, reduce(J, b, Q_w, Q_f, H, h, scratch[2][1])
+    if linear is not None:
+        for i in range(n):
+            h[i] -= linear[i]
+            size += h[i]
     for i in range(K):
         size += mu[i] + f_min[i]
     for i in range(n):
@@ -46,7 +51,7 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no
     if not np.isfinite(size):
         return np.nan
     if n == 3:  # exact up to eps cond(H): most problems need no more
-        piece, best = _closed_form(J, b, Q_w, Q_f, H, h, mu, f_min, f, w, pull)
+        piece, best = _closed_form(J, b, Q_w, Q_f, H, h, mu, f_min, f, w, pull, linear)
         if best <= EXACT:
             return best
     work = opened(scratch)
@@ -55,18 +60,18 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no
         work.piece[0] = piece
         for i in range(n):
             now[i] = f[i]
-        best = _try(J, b, Q_w, Q_f, mu, f_min, axes, 1, f, w, best, work)
+        best = _try(J, b, Q_w, Q_f, mu, f_min, axes, 1, f, w, best, work, linear)
         if best <= EXACT:
             return best
     if _nothing_pulls(h, mu, f_min, axes):  # f = 0 is optimal, exactly
         for i in range(n):
             now[i] = 0.0
-        return _try(J, b, Q_w, Q_f, mu, f_min, axes, 0, f, w, best, work)
+        return _try(J, b, Q_w, Q_f, mu, f_min, axes, 0, f, w, best, work, linear)
     _free_minimum(work.H, h, work)
     if _inside(mu, f_min, axes, now):
         for i in range(K):
             work.piece[i] = INSIDE
-        best = _try(J, b, Q_w, Q_f, mu, f_min, axes, GUESSES, f, w, best, work)
+        best = _try(J, b, Q_w, Q_f, mu, f_min, axes, GUESSES, f, w, best, work, linear)
         if best <= EXACT:
             return best
     cones, gap, left, size = _start(mu, f_min, axes, work)
@@ -76,7 +81,7 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no
             break
         if gap + left <= goal * size:
             _guess(mu, f_min, work)
-            best = _try(J, b, Q_w, Q_f, mu, f_min, axes, GUESSES, f, w, best, work)
+            best = _try(J, b, Q_w, Q_f, mu, f_min, axes, GUESSES, f, w, best, work, linear)
             if best <= EXACT or goal < 1e-13:
                 break
             goal *= 1e-2
@@ -93,21 +98,21 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no
             break
         gap, left, size = _advance(mu, f_min, axes, alpha, work)
     if best > EXACT:
-        best = _try(J, b, Q_w, Q_f, mu, f_min, axes, 0, f, w, best, work)
+        best = _try(J, b, Q_w, Q_f, mu, f_min, axes, 0, f, w, best, work, linear)
     return best if best < np.inf else np.nan
 
 
 @subroutine
-def _closed_form(J, b, Q_w, Q_f, H, h, mu, f_min, f, w, pull):  # type: ignore[no-untyped-def]
+def _closed_form(J, b, Q_w, Q_f, H, h, mu, f_min, f, w, pull, linear):  # type: ignore[no-untyped-def]
     """One contact in space: write its optimum; its piece, and its certificate."""
     piece = spatial_force(H, h, mu[0], f_min[0], f)
     balancing_wrench(J, b, f, w)
-    residual = kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, pull)
+    residual = kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, pull, linear)
     return piece, residual if np.isfinite(residual) else np.inf  # of an H that rounding made indefinite
 
 
 @subroutine
-def _try(J, b, Q_w, Q_f, mu, f_min, axes, polishes, f, w, best, work):  # type: ignore[no-untyped-def]
+def _try(J, b, Q_w, Q_f, mu, f_min, axes, polishes, f, w, best, work, linear):  # type: ignore[no-untyped-def]
     """Polish the iterate, or with no polishes take it as it is; keep it in f and w if its certificate is better."""
     trial_f, trial_w = work.trial_f, work.trial_w
     for _ in range(max(polishes, 1)):
@@ -115,8 +120,8 @@ def _try(J, b, Q_w, Q_f, mu, f_min, axes, polishes, f, w, best, work):  # type: 
             trial_f[i] = work.now[i]
         balancing_wrench(J, b, trial_f, trial_w)
         if polishes > 0:
-            polish(J, Q_w, Q_f, work.H, mu, f_min, axes, work.piece, trial_f, trial_w, work)
-        residual = kkt_residual(J, b, Q_w, Q_f, mu, f_min, trial_w, trial_f, work.pull)
+            polish(J, Q_w, Q_f, work.H, mu, f_min, axes, work.piece, trial_f, trial_w, work, linear)
+        residual = kkt_residual(J, b, Q_w, Q_f, mu, f_min, trial_w, trial_f, work.pull, linear)
         if residual < best:
             best = residual
             for i in range(f.shape[0]):
@@ -125,7 +130,7 @@ def _try(J, b, Q_w, Q_f, mu, f_min, axes, polishes, f, w, best, work):  # type: 
                 w[i] = trial_w[i]
         if best <= EXACT or polishes == 0:
             return best
-        gradient(J, Q_w, Q_f, trial_w, trial_f, work.pull, work.z)
+        gradient(J, Q_w, Q_f, trial_w, trial_f, work.pull, work.z, linear)
         if not release(mu, axes, work.piece, trial_f, work.z):
             return best
     return best

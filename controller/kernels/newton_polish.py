@@ -14,8 +14,8 @@ STEPS = 12  # bound of the Newton steps; 2 or 3 suffice once the pieces are righ
 
 
 @subroutine
-def gradient(J, Q_w, Q_f, w, f, pull, z):  # type: ignore[no-untyped-def]
-    """Write Q_w w into pull[0] (nw,) and Q_f f - J'Q_w w, the gradient of the objective along f, into z (n,)."""
+def gradient(J, Q_w, Q_f, w, f, pull, z, linear):  # type: ignore[no-untyped-def]
+    """Write Q_w w into pull[0] (nw,) and Q_f f + linear - J'Q_w w, the gradient of the cost along f, into z (n,)."""
     nw, n = J.shape
     for i in range(nw):
         value = 0.0
@@ -24,6 +24,9 @@ def gradient(J, Q_w, Q_f, w, f, pull, z):  # type: ignore[no-untyped-def]
         pull[0, i] = value
     for j in range(n):
         z[j] = 0.0
+    if linear is not None:  # a branch that the compiler decides
+        for j in range(n):
+            z[j] = linear[j]
     for i in range(n):  # rows on the outside: contiguous, so that it vectorises; Q_f is symmetric
         value = f[i]
         for j in range(n):
@@ -35,7 +38,7 @@ def gradient(J, Q_w, Q_f, w, f, pull, z):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def polish(J, Q_w, Q_f, H, mu, f_min, axes, piece, f, w, work):  # type: ignore[no-untyped-def]
+def polish(J, Q_w, Q_f, H, mu, f_min, axes, piece, f, w, work, linear):  # type: ignore[no-untyped-def]
     """Improve f (n,) and w (nw,) in place on the pieces `piece` (K,) int, which a blocked step may change.
 
     The wrench is updated as w - J (change of f) and not recomputed as b - J f. Where w is the small difference of two
@@ -54,7 +57,7 @@ def polish(J, Q_w, Q_f, H, mu, f_min, axes, piece, f, w, work):  # type: ignore[
         _land(mu[i], f_min[i], axes, piece, i, f[i * dim : (i + 1) * dim])
     _carry(J, f, moved, w)
     for _ in range(STEPS):
-        gradient(J, Q_w, Q_f, w, f, work.pull, z)
+        gradient(J, Q_w, Q_f, w, f, work.pull, z, linear)
         m = 0
         for i in range(K):
             start[i] = m

@@ -114,11 +114,36 @@ def balancing_wrench(J, b, f, w):  # type: ignore[no-untyped-def]
         w[i] = s
 
 
+@subroutine
+def state_from_apex(J, b, Q_f, f_min, guard):  # type: ignore[no-untyped-def]
+    """State a problem in f - a, a being the cones' apex (n,): the wrench that is left, the linear cost, the floors.
+
+    Args:
+        guard: of `guard_scratch`, with the apex and the floors [N] from 0, which become those from the apex.
+    """
+    a, floor, left, linear, _, _ = guard
+    nw, n = J.shape
+    for i in range(nw):
+        left[i] = b[i]
+        for j in range(n):
+            left[i] -= J[i, j] * a[j]
+    for i in range(n):
+        linear[i] = 0.0
+        for j in range(n):
+            linear[i] += Q_f[i, j] * a[j]
+    K = f_min.shape[0]
+    for c in range(K):
+        floor[c] = max(floor[c] - a[(c + 1) * (n // K) - 1], 0.0)
+
+
 @kernel
-def planar_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch):  # type: ignore[no-untyped-def]
+def planar_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch, linear=None):  # type: ignore[no-untyped-def]
     """Solve one contact in the plane, like `contact_wrench`; scratch contains the values of a `Reduced`."""
     work = Reduced(*scratch)
     reduce(J, b, Q_w, Q_f, work.H, work.h, work.x)
+    if linear is not None:
+        for j in range(2):
+            work.h[j] -= linear[j]
     planar_force(work.H, work.h, mu[0], f_min[0], f)
     balancing_wrench(J, b, f, w)
-    return kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, work.pull)
+    return kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, work.pull, linear)

@@ -74,3 +74,12 @@ def opened(scratch):  # type: ignore[no-untyped-def]
         vectors[6], wrenches[0], wrenches[1:], tangent, counts[0], counts[1], triples[0], triples[1], fours[0],
         fours[1], triples[2], triples[3], floor,
     )  # fmt: skip
+
+
+def guard_scratch(nw: int, K: int, dim: int) -> tuple[Any, ...]:
+    """The scratch for moving cones: apex (n,), floor (K,), the wrench required from there (nw,), linear cost (n,).
+
+    In the plane also corner (4, 2) and ends (3, 2), see `worst_planar_force`.
+    """
+    n = K * dim
+    return np.zeros(n), np.zeros(K), np.zeros(nw), np.zeros(n), np.zeros((4, 2)), np.zeros((3, 2))

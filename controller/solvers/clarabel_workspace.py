@@ -23,7 +23,7 @@ class ClarabelWorkspace:
 
     def __init__(self, problem: WrenchProblem, **options: Any):
         self._problem = problem
-        self._assembler = wrench_program(problem.contacts, problem.dim)
+        self._assembler = wrench_program(problem.contacts, problem.dim, 0, len(problem.apex))
         program, self._unit = self._assembler.assemble(problem)
         self._clarabel = Clarabel(program, {**SETTINGS["wrench, in place"], **options})
         if not self._clarabel.replaceable:
@@ -37,6 +37,8 @@ class ClarabelWorkspace:
         """
         if problem.jacobian.shape != self._problem.jacobian.shape:
             raise fail("problem", problem.jacobian.shape, f"of the workspace's shape {self._problem.jacobian.shape}")
+        if len(problem.apex) != len(self._problem.apex):
+            raise fail("problem", f"one with {len(problem.apex)} cones a contact", f"{len(self._problem.apex)} of them")
         program, unit = self._assembler.assemble(problem)
         self._clarabel.replace(program)
         self._problem, self._unit = problem, unit

@@ -12,12 +12,13 @@ def closed_form(problem: WrenchProblem) -> tuple[Array, Array]:
     """Compute the smallest wrench w (nw,) and its contact forces f (K d,) [N, N m], without certifying them."""
     nw, n = problem.jacobian.shape
     f, w = np.empty(n), np.empty(nw)
-    # copies that may be written, as in the loop: of read-only arrays numba would compile everything again
-    data = [np.array(values) for values in (problem.jacobian, problem.required, problem.Q_w, problem.Q_f)]
-    cones = np.array(problem.mu_planned), np.array(problem.f_min)
     planar, several = workspace(nw, problem.contacts, problem.dim)
-    if planar is not None:
-        planar_wrench(*data, *cones, f, w, planar)
-    else:
-        contact_wrench(*data, *cones, f, w, several)
-    return w, f
+    kernel, scratch = (contact_wrench, several) if planar is None else (planar_wrench, planar)
+    if not problem.moved:
+        # copies that may be written, as in the loop: of read-only arrays numba would compile everything again
+        stated = problem.jacobian, problem.required, problem.Q_w, problem.Q_f, problem.mu_planned, problem.f_min
+        kernel(*(np.array(values) for values in stated), f, w, scratch)
+        return w, f
+    apex, (*moved, linear) = problem.from_apex
+    kernel(*moved, f, w, scratch, linear)
+    return w, f + apex

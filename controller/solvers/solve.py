@@ -99,7 +99,7 @@ def _by_closed_form(problem: WrenchProblem, edges: int) -> tuple[Array, Array, s
 
 
 def _by_program(solver: ConicSolver, problem: WrenchProblem, edges: int) -> tuple[Array, Array, str]:
-    assembler = wrench_program(problem.contacts, problem.dim, edges)
+    assembler = wrench_program(problem.contacts, problem.dim, edges, len(problem.apex))
     program, unit = assembler.assemble(problem)
     answer = solver(program)
     return *assembler.wrench_and_force(answer.x, unit), answer.message

@@ -21,12 +21,13 @@ class WrenchProgram:
     Args:
         contacts, dim: of the problems.
         edges: number of edges of the pyramids that replace the cones in space; 0 for the cones themselves.
+        members: V, of the cones at each contact.
     """
 
-    def __init__(self, contacts: int, dim: int, edges: int = 0):
+    def __init__(self, contacts: int, dim: int, edges: int = 0, members: int = 1):
         nw, n = 3 * dim - 3, contacts * dim
         self._dim, self._edges = dim, edges
-        cones = friction_limits(np.ones(contacts), np.ones(contacts), dim, edges)
+        cones = friction_limits(np.ones(contacts), np.ones(contacts), dim, edges, np.zeros((members, contacts, dim)))
         self.cones = Cones(nw, len(cones.linear), cones.orders)
         f, w = np.arange(n), np.arange(n, n + nw)
         balance, linear, cone = np.split(np.arange(nw + len(cones.linear) + len(cones.cone)), np.cumsum(self.cones[:2]))
@@ -49,10 +50,11 @@ class WrenchProgram:
     def assemble(self, problem: WrenchProblem) -> tuple[ConicProgram, float]:
         """The program and the unit [N] of its forces; without a load the unit is 0, and the answer exactly zero."""
         # lists are faster than NumPy for so few; no entry of a positive definite matrix exceeds those on its diagonal
-        unit = max(map(abs, problem.required.tolist() + problem.f_min.tolist()))
+        tips = problem.apex.ravel().tolist() if problem.moved else []
+        unit = max(map(abs, problem.required.tolist() + problem.f_min.tolist() + tips))
         scale = unit or 1.0
         heaviest = max(problem.Q_f.diagonal().tolist() + problem.Q_w.diagonal().tolist())
-        cones = friction_limits(problem.mu_planned, problem.f_min / scale, self._dim, self._edges)
+        cones = friction_limits(problem.mu_planned, problem.f_min / scale, self._dim, self._edges, problem.apex / scale)
         J = np.array(problem.jacobian)  # that may be written: kernels tell the two apart
         A = self._A.filled((J[None], cones.linear[None], cones.cone[None]))
         P = self._P.filled(((problem.Q_f / heaviest)[None], (problem.Q_w / heaviest)[None]))
@@ -67,6 +69,6 @@ class WrenchProgram:
 
 
 @cache
-def wrench_program(contacts: int, dim: int, edges: int = 0) -> WrenchProgram:
+def wrench_program(contacts: int, dim: int, edges: int = 0, members: int = 1) -> WrenchProgram:
     """The `WrenchProgram` of a shape, which is made once and kept."""
-    return WrenchProgram(contacts, dim, edges)
+    return WrenchProgram(contacts, dim, edges, members)

@@ -6,7 +6,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.validate import Array, array, fail, frozen, number
+from pivoting.controller.validate import Array, array, fail, frozen, number, one_of
 
 SHOVE_SECONDS = 0.05  # over which a shove is spread, unless it is said otherwise [s]
 
@@ -40,11 +40,11 @@ class Member(NamedTuple):
     """One world of the set.
 
     Attributes:
-        mass: [kg].  com: (d,) from where the controller takes the CoM to be, object axes [m].
-        inertia: factor on the believed inertia about the CoM.  mu: friction coefficient; None: as believed.
+        mass: [kg]; None: as believed.  com: (d,) from where the controller takes the CoM to be, object axes [m].
+        inertia: factor on the believed inertia.  mu: friction coefficient; None: as believed.
     """
 
-    mass: float
+    mass: float | None
     com: Array
     inertia: float
     mu: float | None
@@ -58,10 +58,13 @@ class Uncertainty:
     in 0, and for `shove`, it stands for the greatest deviation either way.
 
     Attributes:
-        mass: of the object [kg].
+        mass: of the object [kg]; None: as believed.
         com: (d, 2) the true centre of mass, from the point of the body that the controller takes for it, at which its
             wrench acts; object axes [m].
-        inertia: factor on the inertia about the centre of mass that is believed.
+        inertia: factor on the believed inertia `about` the centre of mass or the contact.
+        about: "com" or "contact"; in the plane the latter means the square of the radius of gyration about the contact,
+            in space the tensor about it, both with the believed mass and centre of mass. What a pivot's motion tells is
+            about the contact, and a guarantee for such a set is exact; one about the centre of mass is bounded.
         mu: friction coefficient of every contact; None: as believed. Only the lower bound matters to a grip.
         shove: impulse of a shove at the true centre of mass, per true kg, in any direction [N s/kg].
         shove_seconds: over which a shove is spread at least [s].
@@ -72,9 +75,10 @@ class Uncertainty:
         ValueError: an interval that is empty, not finite, or of values that no world has; it is named.
     """
 
-    mass: Interval
+    mass: Interval | None
     com: Array
     inertia: Interval
+    about: str
     mu: Interval | None
     shove: Interval
     shove_seconds: float
@@ -84,9 +88,10 @@ class Uncertainty:
     def __init__(
         self,
         *,
-        mass: ArrayLike,
+        mass: ArrayLike | None = None,
         com: ArrayLike = 0.0,
         inertia: ArrayLike = 1.0,
+        about: str = "com",
         mu: ArrayLike | None = None,
         shove: ArrayLike = 0.0,
         shove_seconds: float = SHOVE_SECONDS,
@@ -96,9 +101,13 @@ class Uncertainty:
     ):
         """The set; `dim`: 2 in the plane or 3 in space, needed where `com` is one interval for all axes."""
         put = object.__setattr__
-        put(self, "mass", _positive("mass", mass, "kg"))
+        put(self, "mass", None if mass is None else _positive("mass", mass, "kg"))
         put(self, "com", _box(com, dim))
         put(self, "inertia", _positive("inertia", inertia, ""))
+        if not self.inertia.low <= 1.0 <= self.inertia.high:
+            raise fail("inertia", inertia, "a factor on what is believed, an interval with 1 in it")
+        one_of("about", about, ("com", "contact"))
+        put(self, "about", about)
         put(self, "mu", None if mu is None else _positive("mu", mu, ""))
         put(self, "shove", _about_zero("shove", shove))
         put(self, "shove_seconds", number("shove_seconds", shove_seconds, above=0.0, unit="s"))
@@ -124,7 +133,7 @@ class Uncertainty:
         """The member at these shares (unknowns,) of the way through the intervals, of mass, inertia, mu and com."""
         mass, inertia, mu, *com = array("shares", shares, (self.unknowns,)).tolist()
         return Member(
-            self.mass.at(mass),
+            None if self.mass is None else self.mass.at(mass),
             frozen(np.array([Interval(*row).at(share) for row, share in zip(self.com, com, strict=True)])),
             self.inertia.at(inertia),
             None if self.mu is None else self.mu.at(mu),
@@ -132,7 +141,8 @@ class Uncertainty:
 
     def vertices(self) -> list[Member]:
         """All members at the ends of their intervals; what is known exactly has one end."""
-        widths = [self.mass.half, self.inertia.half, self.mu.half if self.mu else 0.0, *np.ptp(self.com, axis=1)]
+        known = [0.0 if each is None else each.half for each in (self.mass, self.inertia, self.mu)]
+        widths = [*known, *np.ptp(self.com, axis=1)]
         return [self.at(ends) for ends in product(*((0.0, 1.0) if width > 0.0 else (0.0,) for width in widths))]
 
     def scaled(self, scale: float) -> Self:

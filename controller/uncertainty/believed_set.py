@@ -1,0 +1,65 @@
+"""What a controller makes of its uncertainty: the arrays of the compiled step, and the cones that its contacts keep to."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from pivoting.controller.belief import BelievedSet
+from pivoting.controller.contacts import Contact
+from pivoting.controller.control_laws import Body
+from pivoting.controller.plane_and_space import Space
+from pivoting.controller.uncertainty.uncertainty import Uncertainty
+from pivoting.controller.validate import Array, fail
+
+
+def check_set(uncertainty: Uncertainty, body: Body, contacts: Sequence[Contact]) -> None:
+    """Refuse a set that no guarantee can be given for.
+
+    Raises:
+        ValueError: it is of another dimension, does not hold what is believed, or the contacts roll.
+    """
+    if not isinstance(uncertainty, Uncertainty):
+        raise fail("uncertainty", uncertainty, "an Uncertainty")
+    if uncertainty.dim != contacts[0].dim:
+        raise fail("uncertainty.com", uncertainty.com, f"of {contacts[0].dim} intervals, for these contacts")
+    mass = uncertainty.mass
+    if mass is not None and not mass.low <= body.mass <= mass.high:
+        raise fail("uncertainty.mass", mass, f"such that the believed mass of {body.mass:g} kg is in it")
+    if any(contact.radius > 0.0 for contact in contacts):
+        raise fail("uncertainty", uncertainty, "left out: of contacts that roll nothing is guaranteed")
+
+
+def believed_set(uncertainty: Uncertainty, body: Body, gravity: Array, space: Space) -> BelievedSet:
+    """The set as the compiled step takes it.
+
+    An error of the measured orientation tilts gravity against what is believed, like a push, and the contact's axes.
+    """
+    mass = (body.mass, body.mass) if uncertainty.mass is None else uncertainty.mass
+    tilt = greatest(uncertainty.theta)
+    shove = greatest(uncertainty.shove) / uncertainty.shove_seconds
+    return BelievedSet(
+        mass=np.array(mass, dtype=float),
+        com=np.ascontiguousarray(space.lift(uncertainty.com.T).T),
+        inertia=np.array(uncertainty.inertia),
+        about_contact=uncertainty.about == "contact",
+        push=shove + 2.0 * float(np.linalg.norm(gravity)) * np.sin(0.5 * tilt),
+        spin=greatest(uncertainty.omega),
+    )
+
+
+def guarded_cones(uncertainty: Uncertainty, contacts: Sequence[Contact], margin: float) -> tuple[Array, Array]:
+    """Friction (K,) that may be used and floors (K,) [N] of every member, however the contact's axes are tilted.
+
+    Raises:
+        ValueError: no friction is left.
+    """
+    low = [contact.mu if uncertainty.mu is None else uncertainty.mu.low for contact in contacts]
+    tilt, floors = greatest(uncertainty.theta), np.array([contact.f_min for contact in contacts])
+    mu = np.tan(np.arctan((1.0 - margin) * np.array(low)) - tilt)
+    if not (mu > 0.0).all() or tilt > 0.25 * np.pi:
+        raise fail("uncertainty.theta", uncertainty.theta, f"less than the cone's half-angle, of mu = {min(low):g}")
+    return mu, floors / (np.cos(tilt) - mu * np.sin(tilt))
+
+
+def greatest(interval: tuple[float, float]) -> float:
+    """The greatest deviation from 0."""
+    return max(-interval[0], interval[1])
