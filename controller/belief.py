@@ -68,6 +68,8 @@ class BelievedSet(NamedTuple):
         about_contact: whether these are on the inertia about the contact.
         push: greatest disturbance, in any direction, at the true CoM, per true mass [N/kg].
         spin: greatest error of the measured angular velocity [rad/s].
+        axes: (A, 3) about which the object can turn, object axes, see `free_axes`.
+        spread: (3 K, 6) contact forces of a wrench on the object, all in object axes, that do not squeeze each other.
     """
 
     mass: Array
@@ -76,6 +78,8 @@ class BelievedSet(NamedTuple):
     about_contact: bool
     push: float
     spin: float
+    axes: Array
+    spread: Array
 
 
 class Belief(NamedTuple):
@@ -119,8 +123,9 @@ def for_worlds(beliefs: Sequence[Belief]) -> tuple[tuple[object, ...] | None, ..
 
 def _kind(belief: Belief) -> list[object]:
     """What the beliefs of one fleet have in common: the shapes of all arrays, which contacts turn, of what set."""
-    of = None if belief.unknown is None else belief.unknown.about_contact
-    return [*(np.shape(value) for part in belief[:3] for value in part), *belief.contacts.turning.tolist(), of]
+    unknown = () if belief.unknown is None else belief.unknown
+    shapes = [np.shape(value) for part in (*belief[:3], unknown) for value in part]
+    return [*shapes, *belief.contacts.turning.tolist(), belief.unknown is not None and belief.unknown.about_contact]
 
 
 def _stacked(parts: Sequence[Any]) -> tuple[object, ...]:

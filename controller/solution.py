@@ -52,6 +52,7 @@ def certified(
     wrench: Array,
     force: Array,
     message: str,
+    own: float,
     *,
     method: str,
     seconds: float,
@@ -62,11 +63,13 @@ def certified(
 
     Args:
         message: what the solver reported; an error quotes it.
+        own: the relative KKT residual with the solver's own multipliers, computed here. Where contacts have several
+            cones it is the certificate; where each has one, the multipliers follow from the answer.
 
     Raises:
         SolveError: the residual is above `tolerance`, or the answer is not finite.
     """
-    residual = problem.residual(wrench, force, edges=edges)
+    residual = own if problem.several else problem.residual(wrench, force, edges=edges)
     if residual <= tolerance:
         status = INSCRIBED if edges else STATUS[0]
     else:

@@ -15,7 +15,7 @@ from pivoting.controller.belief import Belief, BelievedObject, HeldContacts, Wre
 from pivoting.controller.contacts import Contact
 from pivoting.controller.control_laws import Body, Law
 from pivoting.controller.kernels.compiled_step import state_cones, state_problem
-from pivoting.controller.kernels.workspace import guard_scratch, workspace
+from pivoting.controller.kernels.workspace import MEMBERS, guard_scratch, several_workspace, workspace
 from pivoting.controller.motion import Motion
 from pivoting.controller.plane_and_space import Space, space
 from pivoting.controller.rotations import IDENTITY, rotation_matrix
@@ -110,7 +110,7 @@ class WrenchController:
         gravity = self.gravity if self.gravity.size == 3 else here.lift(self.gravity)
         if self.uncertainty is not None:
             mu, f_min = guarded_cones(self.uncertainty, self.contacts, self.margin)
-            unknown = believed_set(self.uncertainty, self.body, gravity, here)
+            unknown = believed_set(self.uncertainty, self.body, gravity, points, points.mean(axis=0), here)
         held = HeldContacts(
             points=points,
             offsets=offsets,
@@ -141,9 +141,13 @@ class WrenchController:
     def workspace(self) -> tuple[tuple[Any, ...] | None, ...]:
         """Scratch of the compiled loop, one for each thread."""
         nw, n = len(self.Q_w), len(self.Q_f)
-        guard = None if self.uncertainty is None else guard_scratch(nw, len(self.contacts), self.space.dim)
+        K, dim, guard = len(self.contacts), self.space.dim, None
+        planar, several = workspace(nw, K, dim)
+        if self.uncertainty is not None:
+            guard = guard_scratch(nw, K, dim)
+            several = None if several is None else several_workspace(nw, K, dim, MEMBERS)
         own = np.empty((3, 3)), np.empty((nw, n)), np.empty((nw, nw)), np.empty(6), guard
-        return own, *workspace(nw, len(self.contacts), self.space.dim)
+        return own, planar, several
 
     def jacobian(self, orientation: Array) -> Array:
         """The contact Jacobian (nw, K d), in object axes, at an orientation (4,), object axes to world."""
@@ -167,8 +171,9 @@ class WrenchController:
         held, floors, apex = self.belief.contacts, self.belief.contacts.f_min, None
         if self.uncertainty is not None:
             guard = guard_scratch(len(required), len(self.contacts), self.space.dim)
-            state_cones(self.belief, *(np.array(values) for values in measured), np.empty((3, 3)), required, guard)
-            apex, floors = guard[0].reshape(1, len(self.contacts), -1), guard[1]
+            seen = [np.array(values) for values in measured]
+            members, _ = state_cones(self.belief, *seen, np.empty((3, 3)), required, guard)
+            apex, floors = guard[6][:members], guard[1]
         if external is not None:
             required -= array("external", external, required.shape)
         # as it was given, where it is: (1 - margin) mu is to be the same to the last bit

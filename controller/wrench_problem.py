@@ -139,19 +139,28 @@ class WrenchProblem:
         """Whether any cone's apex is not at 0."""
         return len(self.apex) > 1 or bool(self.apex.any())
 
+    @property
+    def several(self) -> bool:
+        """Whether a contact has several cones; in the plane they are one, their intersection."""
+        return len(self.apex) > 1 and self.dim == 3
+
     @cached_property
     def from_apex(self) -> tuple[Array, tuple[Array, ...]]:
         """The apex a (K d,), and the same problem in f - a: J, required, Q_w, Q_f, mu, floors and a linear cost.
 
         Raises:
-            ValueError: there are several cones at one contact.
+            ValueError: there are several cones at one contact in space.
         """
-        if len(self.apex) > 1:
+        if self.several:
             raise fail("apex", self.apex, "one for each contact: with several, take the residual of the `Solution`")
-        a = self.apex[0].ravel()
-        floors = np.maximum(self.f_min - self.apex[0, :, -1], 0.0)
+        tips, mu = self.apex, self.mu_planned
+        if len(tips) > 1:  # right and left edge of the intersection: mu f_n + f_t and mu f_n - f_t are at least these
+            right, left = (mu * tips[..., 1] + tips[..., 0]).max(axis=0), (mu * tips[..., 1] - tips[..., 0]).max(axis=0)
+            tips = np.stack([0.5 * (right - left), 0.5 * (right + left) / mu], axis=-1)[None]
+        a = tips[0].ravel()
+        floors = np.maximum(self.f_min - tips[0, :, -1], 0.0)
         b, linear = self.required - self.jacobian @ a, self.Q_f @ a
-        data = self.jacobian, b, self.Q_w, self.Q_f, self.mu_planned, floors, linear
+        data = self.jacobian, b, self.Q_w, self.Q_f, mu, floors, linear
         return a, tuple(np.array(values) for values in data)  # that may be written: kernels tell the two apart
 
     def _pyramid(self, edges: int) -> Polygon:
@@ -162,7 +171,8 @@ class WrenchProblem:
     def standard_form(self, *, edges: int = 0) -> StandardForm:
         """The problem as the quadratic program of the notes, in x = (f, w).
 
-        For each contact, the rows of C are the floor and the sides of the cone; those of further cones come last. In the plane these are the right and
+        For each contact, the rows of C are the floor and the sides of the cone; those of further cones come last. In
+        the plane these are the right and
         the left side. In space the cone is replaced by the inscribed pyramid with `edges` faces; an answer is then
         feasible for the cone but, in general, not optimal.
 

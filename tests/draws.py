@@ -157,7 +157,7 @@ def closed_form_residuals(many: Data) -> np.ndarray:
 
 @kernel
 def _closed_form(J, b, Q_w, Q_f, mu, f_min, residual, f, w, scratch):  # type: ignore[no-untyped-def]
-    work = opened(scratch)
+    work = opened(scratch, mu.shape[1])
     for i in range(J.shape[0]):
         reduce(J[i], b[i], Q_w[i], Q_f[i], work.H, work.h, work.x)
         work.piece[0] = spatial_force(work.H, work.h, mu[i, 0], f_min[i, 0], f)

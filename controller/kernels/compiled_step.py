@@ -4,9 +4,11 @@ import numpy as np
 from pivoting.controller.belief import HeldContacts
 from pivoting.controller.contacts import fill_jacobian
 from pivoting.controller.kernels.compilation import kernel, subroutine
+from pivoting.controller.kernels.guarded_interior_point import guarded_wrench
 from pivoting.controller.kernels.interior_point import contact_wrench
 from pivoting.controller.kernels.planar_closed_form import planar_wrench, state_from_apex
 from pivoting.controller.kernels.required_wrench import fill_required
+from pivoting.controller.kernels.worst_member_forces import move_cones
 from pivoting.controller.kernels.worst_planar_force import move_planar_cone
 from pivoting.controller.rotations import fill_rotation, turned
 from pivoting.controller.solution import FAILED, INACCURATE, SOLVED
@@ -46,7 +48,15 @@ def state_cones(belief, q, omega, R, b, guard):  # type: ignore[no-untyped-def]
     """
     moved, held, (wrench_map, _), _, unknown = belief
     fill_rotation(q, R)
-    return move_planar_cone(R, omega, b, moved, held, wrench_map, unknown, guard)
+    return guard_state(R, omega, b, moved, held, wrench_map, unknown, guard)
+
+
+@subroutine
+def guard_state(R, omega, b, moved, held, wrench_map, unknown, guard):  # type: ignore[no-untyped-def]
+    """Write the apexes and floors that all members ask for; returns how many members, and what had to be added [N]."""
+    if held.Q_f.shape[0] == 2:
+        return 1, move_planar_cone(R, omega, b, moved, held, wrench_map, unknown, guard)
+    return move_cones(R, omega, b, moved, held, wrench_map, unknown, guard[7], guard[6], guard[1])
 
 
 @subroutine
@@ -61,8 +71,8 @@ def contacts_of(held, i):  # type: ignore[no-untyped-def]
 @subroutine
 def set_of(unknown, i):  # type: ignore[no-untyped-def]
     """The values of the `BelievedSet` of one world, among those of `belief.for_worlds`."""
-    mass, com, inertia, about_contact, push, spin = unknown
-    return mass[i], com[i], inertia[i], about_contact, push[i], spin[i]
+    mass, com, inertia, about_contact, push, spin, axes, spread = unknown
+    return mass[i], com[i], inertia[i], about_contact, push[i], spin[i], axes[i], spread[i]
 
 
 @kernel
@@ -100,11 +110,17 @@ def step_worlds(  # type: ignore[no-untyped-def]
         fill_jacobian(R, held, wrench_map, J)
         q_d, omega_d, alpha_d = desired[j, :4], desired[j, 4:7], desired[j, 7:10]
         fill_required(R, q, omega, q_d, omega_d, alpha_d, moved, held.pivot, held.offset, wrench_map, law, b)
-        if unknown is not None:
+        if unknown is not None and planar is not None:
             move_planar_cone(R, omega, b, moved, held, wrench_map, set_of(unknown, mine), guard)
+        if unknown is not None and several is not None:
+            members, _ = move_cones(
+                R, omega, b, moved, held, wrench_map, set_of(unknown, mine), guard[7], guard[6], guard[1]
+            )
         for row in range(nw):
             b[row] -= external[i % external.shape[0], row]
-        if unknown is not None:
+        if unknown is not None and planar is not None:
+            for a in range(2):
+                guard[0][a] = guard[6][0, 0, a]
             state_from_apex(J, b, Q_f, f_min, guard)
         ball, multiplier, Q = -1, 0.0, Q_w
         for attempt in range(ATTEMPTS + 1):
@@ -116,8 +132,10 @@ def step_worlds(  # type: ignore[no-untyped-def]
                 residual = planar_wrench(J, b, Q, Q_f, mu, f_min, force, wrench, planar)
             if planar is not None and unknown is not None:
                 residual = planar_wrench(J, guard[2], Q, Q_f, mu, guard[1], force, wrench, planar, guard[3])
-            if several is not None:
+            if several is not None and unknown is None:
                 residual = contact_wrench(J, b, Q, Q_f, mu, f_min, force, wrench, several)
+            if several is not None and unknown is not None:
+                residual = guarded_wrench(J, b, Q, Q_f, mu, guard[1], guard[6][:members], force, wrench, several, guard)
             if bounds is None:
                 break
             if attempt == 0:
@@ -134,9 +152,8 @@ def step_worlds(  # type: ignore[no-untyped-def]
             multiplier = root[0]
             if attempt >= ATTEMPTS - 1 or not multiplier <= HEAVIEST * root[5]:  # out of reach: as without bounds
                 ball = -1
-        if unknown is not None:
-            for j in range(force.shape[0]):
-                force[j] += guard[0][j]
+        if unknown is not None and planar is not None:
+            force[0], force[1] = force[0] + guard[0][0], force[1] + guard[0][1]
         out[i, last] = residual
         if not np.isfinite(residual):
             status[i] = FAILED

@@ -54,7 +54,7 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch, linear=None):  # ty
         piece, best = _closed_form(J, b, Q_w, Q_f, H, h, mu, f_min, f, w, pull, linear)
         if best <= EXACT:
             return best
-    work = opened(scratch)
+    work = opened(scratch, K)
     axes, now = work.axes, work.now
     if n == 3:
         work.piece[0] = piece
@@ -67,14 +67,14 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch, linear=None):  # ty
         for i in range(n):
             now[i] = 0.0
         return _try(J, b, Q_w, Q_f, mu, f_min, axes, 0, f, w, best, work, linear)
-    _free_minimum(work.H, h, work)
+    free_minimum(work.H, h, work)
     if _inside(mu, f_min, axes, now):
         for i in range(K):
             work.piece[i] = INSIDE
         best = _try(J, b, Q_w, Q_f, mu, f_min, axes, GUESSES, f, w, best, work, linear)
         if best <= EXACT:
             return best
-    cones, gap, left, size = _start(mu, f_min, axes, work)
+    cones, gap, left, size = start(mu, f_min, axes, work)
     goal, least = FIRST_GOAL, np.inf
     for _ in range(ITERATIONS):
         if not gap + left < np.inf:
@@ -96,7 +96,7 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch, linear=None):  # ty
         alpha = correct(mu, f_min, axes, sigma * max(gap, left) / cones, second, work)
         if alpha <= 1e-12:
             break
-        gap, left, size = _advance(mu, f_min, axes, alpha, work)
+        gap, left, size = advance(mu, f_min, axes, alpha, work)
     if best > EXACT:
         best = _try(J, b, Q_w, Q_f, mu, f_min, axes, 0, f, w, best, work, linear)
     return best if best < np.inf else np.nan
@@ -149,7 +149,7 @@ def _nothing_pulls(h, mu, f_min, axes):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def _free_minimum(H, h, work):  # type: ignore[no-untyped-def]
+def free_minimum(H, h, work):  # type: ignore[no-untyped-def]
     """The minimum without cones, into the iterate."""
     n = h.shape[0]
     for i in range(n):
@@ -173,19 +173,21 @@ def _inside(mu, f_min, axes, f):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def _start(mu, f_min, axes, work):  # type: ignore[no-untyped-def]
+def start(mu, f_min, axes, work):  # type: ignore[no-untyped-def]
     """From the free minimum in `now` to a strictly feasible start with multipliers on the central path's scale.
 
     Returns the number of cones, and what `_measure` does.
     """
     dim = len(axes)
-    K = mu.shape[0]
-    now, s, y, floor = work.now, work.s, work.y, work.floor
+    K, M = mu.shape[0], work.of.shape[0]
+    now, s, y, floor, tip = work.now, work.s, work.y, work.floor, work.tip
     largest = 0.0
     for i in range(K * dim):
         largest = max(largest, abs(now[i]))
     for i in range(K):
         largest = max(largest, f_min[i])
+    for i in range(M):
+        largest = max(largest, max(abs(tip[i, 0]), max(abs(tip[i, 1]), abs(tip[i, 2]))))
     for i in range(K):
         normal = (i + 1) * dim - 1
         now[normal] = max(now[normal], f_min[i] + SPREAD * largest)
@@ -193,22 +195,30 @@ def _start(mu, f_min, axes, work):  # type: ignore[no-untyped-def]
         shrink = min(1.0, 0.5 * mu[i] * now[normal] / size) if size > 0.0 else 1.0
         for p in range(i * dim, normal):
             now[p] *= shrink
-    for i in range(K):
+    for i in range(K, M):  # up, until it is well within the other cones, too
+        k = work.of[i]
+        t, e = k * dim, (k + 1) * dim - 1
+        size = np.hypot(now[t] - tip[i, 1], now[t + 1] - tip[i, 2]) if dim == 3 else abs(now[t] - tip[i, 1])
+        now[e] = max(now[e], tip[i, 0] + 2.0 * size / mu[k] + SPREAD * largest)
+    for i in range(M):
         for a in range(3):
             y[i, a] = s[i, a] = 0.0
+    for i in range(K):
         for a in range(5):
             floor[i, a] = 0.0
     _measure(mu, f_min, axes, work)
-    cones = 0
+    cones = M
     level = 0.0
     for i in range(K * dim):
         level += abs(work.g[i] * now[i])
     for i in range(K):
-        cones += 2 if f_min[i] > 0.0 else 1
+        if f_min[i] > 0.0:
+            cones += 1
     level /= cones
-    for i in range(K):  # s o y = level e, p q = level
+    for i in range(M):  # s o y = level e, p q = level
         scale = level / (s[i, 0] ** 2 - s[i, 1] ** 2 - s[i, 2] ** 2)
         y[i, 0], y[i, 1], y[i, 2] = scale * s[i, 0], -scale * s[i, 1], -scale * s[i, 2]
+    for i in range(K):
         if f_min[i] > 0.0:
             floor[i, Q] = level / floor[i, P]
     gap, left, size = _measure(mu, f_min, axes, work)
@@ -220,7 +230,7 @@ def _measure(mu, f_min, axes, work):  # type: ignore[no-untyped-def]
     """Slacks and gradient of the iterate; its gap, what is left of the dual residual, and the size of both."""
     dim = len(axes)
     H, h, now, g, s, y, floor = work.H, work.h, work.now, work.g, work.s, work.y, work.floor
-    n = h.shape[0]
+    z, n = work.z, h.shape[0]
     for i in range(n):
         g[i] = 0.0
     for j in range(n):
@@ -231,17 +241,24 @@ def _measure(mu, f_min, axes, work):  # type: ignore[no-untyped-def]
     for i in range(n):
         size += abs(now[i]) * (abs(g[i]) + abs(h[i]))
         g[i] -= h[i]
-    for i in range(mu.shape[0]):
-        t, e = i * dim, (i + 1) * dim - 1
-        s[i, 0], s[i, 1] = mu[i] * now[e], now[t]
-        left += abs(now[t] * (g[t] - y[i, 1])) + abs(now[e] * (g[e] - mu[i] * y[i, 0] - floor[i, Q]))
+        z[i] = g[i]
+    for i in range(work.of.shape[0]):
+        k = work.of[i]
+        t, e = k * dim, (k + 1) * dim - 1
+        s[i, 0], s[i, 1] = mu[k] * (now[e] - work.tip[i, 0]), now[t] - work.tip[i, 1]
+        z[t], z[e] = z[t] - y[i, 1], z[e] - mu[k] * y[i, 0]
         if dim == 3:
-            s[i, 2] = now[t + 1]
-            left += abs(now[t + 1] * (g[t + 1] - y[i, 2]))
+            s[i, 2] = now[t + 1] - work.tip[i, 2]
+            z[t + 1] -= y[i, 2]
         gap += s[i, 0] * y[i, 0] + s[i, 1] * y[i, 1] + s[i, 2] * y[i, 2]
+    for i in range(mu.shape[0]):
+        e = (i + 1) * dim - 1
         if f_min[i] > 0.0:
             floor[i, P] = now[e] - f_min[i]
             gap += floor[i, P] * floor[i, Q]
+            z[e] -= floor[i, Q]
+    for i in range(n):
+        left += abs(now[i] * z[i])
     return gap, left, size
 
 
@@ -265,13 +282,14 @@ def _guess(mu, f_min, work):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def _advance(mu, f_min, axes, alpha, work):  # type: ignore[no-untyped-def]
+def advance(mu, f_min, axes, alpha, work):  # type: ignore[no-untyped-def]
     """Follow the step: f, and the multipliers; the slacks are functions of f. Returns what `_measure` does."""
     for i in range(work.x.shape[0]):
         work.now[i] += alpha * work.x[i]
-    for i in range(f_min.shape[0]):
+    for i in range(work.of.shape[0]):
         for a in range(3):
             work.y[i, a] += alpha * work.c[i, a]
+    for i in range(f_min.shape[0]):
         if f_min[i] > 0.0:
             work.floor[i, Q] += alpha * work.floor[i, DQ]
     return _measure(mu, f_min, axes, work)

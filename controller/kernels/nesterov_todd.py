@@ -1,6 +1,7 @@
 """One step of the interior-point method: Nesterov-Todd scaling, the affine step and the corrected step.
 
-See `interior_point`. The scaling W of a cone is such that W y = W^-1 s = lam.
+See `interior_point`. Cone i is one of contact `work.of[i]`; the first of each contact is number i of both, and has the
+floor. The scaling W of a cone is such that W y = W^-1 s = lam.
 """
 
 import numpy as np
@@ -31,8 +32,11 @@ def correct(mu, f_min, axes, target, second, work):  # type: ignore[no-untyped-d
     """
     dim = len(axes)
     x, g, u, lam, c, bar, floor = work.x, work.g, work.u, work.lam, work.c, work.bar, work.floor
-    for i in range(mu.shape[0]):
-        t, e = i * dim, (i + 1) * dim - 1
+    for i in range(x.shape[0]):
+        x[i] = -g[i]
+    for i in range(lam.shape[0]):
+        k = work.of[i]
+        t, e = k * dim, (k + 1) * dim - 1
         l0, l1, l2 = lam[i, 0], lam[i, 1], lam[i, 2]
         u0, u1, u2 = u[i, 0], u[i, 1], u[i, 2]
         v0, v1, v2 = -l0 - u0, -l1 - u1, -l2 - u2
@@ -43,10 +47,10 @@ def correct(mu, f_min, axes, target, second, work):  # type: ignore[no-untyped-d
         c1, c2 = (d1 - c0 * l1) * inverse, (d2 - c0 * l2) * inverse
         c[i, 0], c[i, 1], c[i, 2] = c0, c1, c2
         c0, c1, c2 = _unscale(bar[i, 0], bar[i, 1], bar[i, 2], bar[i, 3], c0, c1, c2)
-        x[e], x[t] = mu[i] * c0 - g[e], c1 - g[t]
+        x[e], x[t] = x[e] + mu[k] * c0, x[t] + c1
         if dim == 3:
-            x[t + 1] = c2 - g[t + 1]
-        if f_min[i] > 0.0:
+            x[t + 1] += c2
+        if i < mu.shape[0] and f_min[k] > 0.0:
             floor[i, C] = (target - second * floor[i, DP] * floor[i, DQ]) / floor[i, P]
             x[e] += floor[i, C]
     solve_factored(work.M, x, x.shape[0])
@@ -61,7 +65,8 @@ def _scale(mu, f_min, axes, work):  # type: ignore[no-untyped-def]
     """
     dim = len(axes)
     M, s, y, bar, lam, floor = work.M, work.s, work.y, work.bar, work.lam, work.floor
-    for i in range(mu.shape[0]):
+    for i in range(lam.shape[0]):
+        k = work.of[i]
         s0, s1, s2, y0, y1, y2 = s[i, 0], s[i, 1], s[i, 2], y[i, 0], y[i, 1], y[i, 2]
         size_s, size_y = np.sqrt(_determinant(s0, s1, s2)), np.sqrt(_determinant(y0, y1, y2))
         eta2 = size_s / size_y
@@ -73,17 +78,17 @@ def _scale(mu, f_min, axes, work):  # type: ignore[no-untyped-def]
         l0, l1, l2 = _unscale(b0, b1, b2, eta, s0, s1, s2)
         bar[i, 0], bar[i, 1], bar[i, 2], bar[i, 3] = b0, b1, b2, eta
         lam[i, 0], lam[i, 1], lam[i, 2], lam[i, 3] = l0, l1, l2, size_s * size_y
-        t, e = i * dim, (i + 1) * dim - 1
+        t, e = k * dim, (k + 1) * dim - 1
         scale = 1.0 / eta2
-        head, double = mu[i] * b0, 2.0 * scale
+        head, double = mu[k] * b0, 2.0 * scale
         M[t, t] += scale + double * b1 * b1
         M[t, e] -= double * b1 * head
         if dim == 3:
             M[t, t + 1] += double * b1 * b2
             M[t + 1, t + 1] += scale + double * b2 * b2
             M[t + 1, e] -= double * b2 * head
-        M[e, e] += double * head * head - scale * mu[i] * mu[i]
-        if f_min[i] > 0.0:
+        M[e, e] += double * head * head - scale * mu[k] * mu[k]
+        if i < mu.shape[0] and f_min[k] > 0.0:
             M[e, e] += floor[i, Q] / floor[i, P]
 
 
@@ -97,9 +102,10 @@ def _step_length(mu, f_min, axes, corrected, work):  # type: ignore[no-untyped-d
     dim = len(axes)
     x, s, y, bar, lam, u, c, floor = work.x, work.s, work.y, work.bar, work.lam, work.u, work.c, work.floor
     alpha = 2.0
-    for i in range(mu.shape[0]):
-        t, e = i * dim, (i + 1) * dim - 1
-        s0, s1, s2 = mu[i] * x[e], x[t], x[t + 1] if dim == 3 else 0.0
+    for i in range(lam.shape[0]):
+        k = work.of[i]
+        t, e = k * dim, (k + 1) * dim - 1
+        s0, s1, s2 = mu[k] * x[e], x[t], x[t + 1] if dim == 3 else 0.0
         u0, u1, u2 = _unscale(bar[i, 0], bar[i, 1], bar[i, 2], bar[i, 3], s0, s1, s2)
         l0, l1, l2 = lam[i, 0], lam[i, 1], lam[i, 2]
         if corrected:
@@ -112,7 +118,7 @@ def _step_length(mu, f_min, axes, corrected, work):  # type: ignore[no-untyped-d
             u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
             alpha = min(alpha, _reach(l0, l1, l2, u0, u1, u2))
             alpha = min(alpha, _reach(l0, l1, l2, -l0 - u0, -l1 - u1, -l2 - u2))
-        if f_min[i] > 0.0:
+        if i < mu.shape[0] and f_min[k] > 0.0:
             dp = x[e]
             dq = -floor[i, Q] * (1.0 + dp / floor[i, P])
             if corrected:

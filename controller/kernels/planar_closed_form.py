@@ -121,7 +121,7 @@ def state_from_apex(J, b, Q_f, f_min, guard):  # type: ignore[no-untyped-def]
     Args:
         guard: of `guard_scratch`, with the apex and the floors [N] from 0, which become those from the apex.
     """
-    a, floor, left, linear, _, _ = guard
+    a, floor, left, linear = guard[0], guard[1], guard[2], guard[3]
     nw, n = J.shape
     for i in range(nw):
         left[i] = b[i]

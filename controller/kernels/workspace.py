@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from pivoting.controller.kernels.compilation import subroutine
 from pivoting.controller.validate import Array
 
+MEMBERS = 32  # at the ends of the intervals of an uncertain set: mass, inertia and three of the centre of mass
 P, Q, DP, DQ, C = 0, 1, 2, 3, 4  # columns of `Work.floor`
 
 
@@ -47,6 +48,10 @@ class Work(NamedTuple):
     u: Array  # (K, 3): scaled step of the slack
     c: Array  # (K, 3): scaled corrector
     floor: Array  # (K, 5): slack p = f_n - f_min, its multiplier q, dp, dq, corrector
+    of: NDArray[np.int64]  # (M,): the contact of each cone, of which there are M >= K; all (K, .) from s on are (M, .)
+    tip: Array  # (M, 3): the apex of each cone, (f_n, f_t, f_o)
+    kept: Array  # (M, 3) and (K,): the multipliers of cones and floors that belong to the best iterate
+    kept_floor: Array
 
 
 def workspace(nw: int, K: int, dim: int) -> tuple[tuple[Any, ...] | None, tuple[Any, ...] | None]:
@@ -59,27 +64,37 @@ def workspace(nw: int, K: int, dim: int) -> tuple[tuple[Any, ...] | None, tuple[
     n = K * dim
     if n == 2:
         return tuple(Reduced(np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros((2, nw)))), None
-    axes, counts = tuple(range(dim)), np.zeros((2, K + 1), dtype=np.int64)
-    squares, vectors, tangent = np.zeros((2, n, n)), np.zeros((7, n)), np.zeros((n, dim))
-    wrenches, triples, fours, floor = np.zeros((3, nw)), np.zeros((4, K, 3)), np.zeros((2, K, 4)), np.zeros((K, 5))
-    return None, (axes, squares, vectors, wrenches, tangent, counts, triples, fours, floor)
+    return None, several_workspace(nw, K, dim)
+
+
+def several_workspace(nw: int, K: int, dim: int, cones: int = 1) -> tuple[Any, ...]:
+    """The scratch of `contact_wrench`, and of `guarded_wrench` with so many `cones` at each contact."""
+    n, M, axes, counts = K * dim, K * cones, tuple(range(dim)), np.zeros((2, K + 1), dtype=np.int64)
+    squares, vectors, tangent = np.zeros((2, n, n)), np.zeros((8, n)), np.zeros((n, dim))
+    wrenches, triples, fours, floor = np.zeros((3, nw)), np.zeros((6, M, 3)), np.zeros((2, M, 4)), np.zeros((K, 5))
+    of = np.arange(M, dtype=np.int64) % K
+    return axes, squares, vectors, wrenches, tangent, counts, triples, fours, floor, of
 
 
 @subroutine
-def opened(scratch):  # type: ignore[no-untyped-def]
-    """The `Work` in a scratch of `workspace`."""
-    axes, squares, vectors, wrenches, tangent, counts, triples, fours, floor = scratch
+def opened(scratch, cones):  # type: ignore[no-untyped-def]
+    """The `Work` in a scratch of `workspace`, for so many cones, M."""
+    axes, squares, vectors, wrenches, tangent, counts, triples, fours, floor, of = scratch
     return Work(
         axes, squares[0], vectors[0], squares[1], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5],
-        vectors[6], wrenches[0], wrenches[1:], tangent, counts[0], counts[1], triples[0], triples[1], fours[0],
-        fours[1], triples[2], triples[3], floor,
+        vectors[6], wrenches[0], wrenches[1:], tangent, counts[0], counts[1], triples[0, :cones], triples[1, :cones],
+        fours[0, :cones], fours[1, :cones], triples[2, :cones], triples[3, :cones], floor, of[:cones],
+        triples[4, :cones], triples[5, :cones], vectors[7],
     )  # fmt: skip
 
 
 def guard_scratch(nw: int, K: int, dim: int) -> tuple[Any, ...]:
-    """The scratch for moving cones: apex (n,), floor (K,), the wrench required from there (nw,), linear cost (n,).
+    """The scratch for moving cones: an apex (n,), floors (K,), the wrench required from there (nw,), linear cost (n,).
 
-    In the plane also corner (4, 2) and ends (3, 2), see `worst_planar_force`.
+    Then, for one contact in the plane, corner (4, 2) and ends (3, 2), see `planar_moved_cone`, and the apexes of all
+    members, (`MEMBERS`, K, d), of which the plane needs one; and what `move_cones` needs for the others.
     """
-    n = K * dim
-    return np.zeros(n), np.zeros(K), np.zeros(nw), np.zeros(n), np.zeros((4, 2)), np.zeros((3, 2))
+    n, one = K * dim, K * dim == 2
+    members = np.zeros(5), np.zeros((4, 3)), np.zeros((K, 5, 3)), np.zeros((3, 3)), np.zeros((K, dim)), np.zeros((K, 2))
+    apex = np.zeros((1 if one else MEMBERS, K, dim))
+    return np.zeros(n), np.zeros(K), np.zeros(nw), np.zeros(n), np.zeros((4, 2)), np.zeros((3, 2)), apex, members

@@ -12,8 +12,8 @@ places of its edges and of its floor are the least values of mu d_n + d_t, mu d_
 
 For a set in (m, c, kappa) they are exact: each is affine in m and in kappa, and quadratic in r with a curvature that is
 not positive in every direction, so that the least value over the box of c is on its boundary, an edge of which is a
-parabola. For a set in the inertia about the centre of mass they are quotients of polynomials, which are bounded from below
-by the least quotient of their Bernstein coefficients (Farin, "Curves and Surfaces for CAGD", rational forms).
+parabola. For a set in the inertia about the centre of mass they are quotients of polynomials, which are bounded from
+below by the least quotient of their Bernstein coefficients (Farin, "Curves and Surfaces for CAGD", rational forms).
 """
 
 import numpy as np
@@ -23,14 +23,14 @@ from pivoting.controller.rotations import cross, into
 
 @subroutine
 def move_planar_cone(R, omega, b, moved, held, wrench_map, unknown, guard):  # type: ignore[no-untyped-def]
-    """Write the apex (2,) and the floor (1,) of the cone that all members ask for; returns how much too high it may be.
+    """Write the apex (1, 1, 2) and floor (1,) of the cone that all members ask for; returns how much too high it may be.
 
     Args:
         R: (3, 3) object to world.  omega: (3,) world axes [rad/s].  b: (3,) the required wrench, object axes.
         moved: the values of a `BelievedObject`.  held: `HeldContacts`.  wrench_map: (3, 6), see `Space`.
         unknown: the values of a `BelievedSet`, of one world.  guard: of `guard_scratch`.
     """
-    apex, floor, _, _, corner, ends = guard
+    _, floor, _, _, corner, ends, apex, _ = guard
     mass, inertia, gravity = moved
     normal = wrench_map[2, 3], wrench_map[2, 4], wrench_map[2, 5]
     t = held.frames[0, 0, 0], held.frames[0, 1, 0], held.frames[0, 2, 0]
@@ -47,7 +47,7 @@ def move_planar_cone(R, omega, b, moved, held, wrench_map, unknown, guard):  # t
             about += normal[i] * inertia[i, j] * normal[j]
     floor[0], excess = planar_moved_cone(
         (normal, t, n), ((F0, F1, F2), b[2]), turning, (mass, about), held.pivot,
-        into(R, gravity[0], gravity[1], gravity[2]), held.mu[0], held.f_min[0], unknown, (corner, ends), apex,
+        into(R, gravity[0], gravity[1], gravity[2]), held.mu[0], held.f_min[0], unknown, (corner, ends), apex[0, 0],
     )  # fmt: skip
     return excess
 
@@ -66,7 +66,7 @@ def planar_moved_cone(axes, b, omega, moved, pivot, gravity, mu, f_min, unknown,
     """
     normal, t, n = axes
     corner, ends = scratch
-    masses, com, scales, about_contact, push, spin = unknown
+    masses, com, scales, about_contact, push, spin, _, _ = unknown
     mass, inertia = moved
     turn = _dot(cross(*normal, *t), n)  # 1 if positive angles lead from t to n, else -1
     p_t, p_n = _dot((pivot[0], pivot[1], pivot[2]), t), _dot((pivot[0], pivot[1], pivot[2]), n)

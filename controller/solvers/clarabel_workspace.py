@@ -54,6 +54,5 @@ class ClarabelWorkspace:
         answer = self._clarabel.solve()
         wrench, force = self._assembler.wrench_and_force(answer.x, self._unit)
         seconds = perf_counter() - start
-        return certified(
-            self._problem, wrench, force, answer.message, method="clarabel", seconds=seconds, tolerance=tolerance
-        )
+        said = answer.message, answer.residual
+        return certified(self._problem, wrench, force, *said, method="clarabel", seconds=seconds, tolerance=tolerance)

@@ -16,7 +16,8 @@ from pivoting.controller.validate import Array, fail, number
 from pivoting.controller.wrench_problem import WrenchProblem
 
 EDGES = 8  # of the pyramids that a QP solver is given in space
-Route = Callable[[WrenchProblem, int], tuple[Array, Array, str]]  # edges; wrench (nw,), force (K d,), message
+Route = Callable[[WrenchProblem, int], tuple[Array, Array, str, float]]
+"""Of a problem and edges: wrench (nw,), force (K d,), message, residual with the method's own multipliers."""
 
 
 def solve(
@@ -43,10 +44,10 @@ def solve(
     edges = _edges(problem, method, options)
     route = _route(method, {key: value for key, value in options.items() if key != "edges"})
     start = perf_counter()
-    wrench, force, message = route(problem, edges)
+    wrench, force, message, own = route(problem, edges)
     seconds = perf_counter() - start
     return certified(
-        problem, wrench, force, message, method=method, seconds=seconds, tolerance=tolerance, edges=edges
+        problem, wrench, force, message, own, method=method, seconds=seconds, tolerance=tolerance, edges=edges
     )  # fmt: skip
 
 
@@ -94,12 +95,13 @@ def _route(method: str, options: dict[str, Any]) -> Route:
     raise fail("method", method, "one of closed-form, clarabel, qp:<backend>")
 
 
-def _by_closed_form(problem: WrenchProblem, edges: int) -> tuple[Array, Array, str]:
-    return *closed_form(problem), "compiled kernel"
+def _by_closed_form(problem: WrenchProblem, edges: int) -> tuple[Array, Array, str, float]:
+    wrench, force, residual = closed_form(problem)
+    return wrench, force, "compiled kernel", residual
 
 
-def _by_program(solver: ConicSolver, problem: WrenchProblem, edges: int) -> tuple[Array, Array, str]:
+def _by_program(solver: ConicSolver, problem: WrenchProblem, edges: int) -> tuple[Array, Array, str, float]:
     assembler = wrench_program(problem.contacts, problem.dim, edges, len(problem.apex))
     program, unit = assembler.assemble(problem)
     answer = solver(program)
-    return *assembler.wrench_and_force(answer.x, unit), answer.message
+    return *assembler.wrench_and_force(answer.x, unit), answer.message, answer.residual

@@ -1,4 +1,4 @@
-"""What a controller makes of its uncertainty: the arrays of the compiled step, and the cones that its contacts keep to."""
+"""What a controller makes of its uncertainty: arrays for the compiled step, and the cones that its contacts keep to."""
 
 from collections.abc import Sequence
 
@@ -6,6 +6,7 @@ import numpy as np
 from pivoting.controller.belief import BelievedSet
 from pivoting.controller.contacts import Contact
 from pivoting.controller.control_laws import Body
+from pivoting.controller.mobility import free_axes
 from pivoting.controller.plane_and_space import Space
 from pivoting.controller.uncertainty.uncertainty import Uncertainty
 from pivoting.controller.validate import Array, fail
@@ -28,8 +29,13 @@ def check_set(uncertainty: Uncertainty, body: Body, contacts: Sequence[Contact])
         raise fail("uncertainty", uncertainty, "left out: of contacts that roll nothing is guaranteed")
 
 
-def believed_set(uncertainty: Uncertainty, body: Body, gravity: Array, space: Space) -> BelievedSet:
+def believed_set(
+    uncertainty: Uncertainty, body: Body, gravity: Array, points: Array, pivot: Array, space: Space
+) -> BelievedSet:
     """The set as the compiled step takes it.
+
+    Args:
+        gravity: (3,) world axes.  points: (K, 3) contacts from the believed CoM.  pivot: (3,) their mean; object axes.
 
     An error of the measured orientation tilts gravity against what is believed, like a push, and the contact's axes.
     """
@@ -43,7 +49,19 @@ def believed_set(uncertainty: Uncertainty, body: Body, gravity: Array, space: Sp
         about_contact=uncertainty.about == "contact",
         push=shove + 2.0 * float(np.linalg.norm(gravity)) * np.sin(0.5 * tilt),
         spin=greatest(uncertainty.omega),
+        axes=np.ascontiguousarray(free_axes(points, pivot, space.wrench_map)),
+        spread=_spread(points),
     )
+
+
+def _spread(points: Array) -> Array:
+    """(3 K, 6) the smallest contact forces that make a wrench; moments count in units of the contacts' lever."""
+    size = float(np.linalg.norm(points, axis=1).max())
+    x, y, z = points.T
+    zero = np.zeros_like(x)
+    wedge = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)  # r x f = wedge f
+    grasp = np.concatenate([np.concatenate([np.eye(3), each / size]) for each in wedge], axis=1)
+    return np.ascontiguousarray(np.linalg.pinv(grasp, rcond=1e-9) / np.array([1.0, 1.0, 1.0, size, size, size]))
 
 
 def guarded_cones(uncertainty: Uncertainty, contacts: Sequence[Contact], margin: float) -> tuple[Array, Array]:

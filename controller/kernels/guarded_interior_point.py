@@ -1,0 +1,199 @@
+"""The optimum where each contact force has to be in several moved cones at once: one for every member of a set.
+
+min 1/2 f'H f - h'f  s.t.  (mu (f_n - a_n), f_t - a_t, f_o - a_o) in the second-order cone for every apex a, and
+f_n >= f_min. It is the method of `interior_point`, without its polish: several cones can bind the same force. Every iterate is
+strictly feasible, so that what the last one lacks is optimality, which its multipliers certify.
+"""
+
+import numpy as np
+from pivoting.controller.kernels.compilation import kernel, subroutine
+from pivoting.controller.kernels.interior_point import ITERATIONS, advance, contact_wrench, free_minimum, start
+from pivoting.controller.kernels.nesterov_todd import correct, predict
+from pivoting.controller.kernels.newton_polish import gradient
+from pivoting.controller.kernels.planar_closed_form import balancing_wrench, reduce, state_from_apex
+from pivoting.controller.kernels.workspace import Q, opened
+
+SMALLEST = 1e-15  # relative gap at which there is nothing to improve
+STALLED = 4  # steps without progress after which rounding has the last word
+
+
+@subroutine
+def list_cones(apex, mu, scratch):  # type: ignore[no-untyped-def]
+    """List the cones that no other one contains, the highest of each contact first, from whose apex all are counted.
+
+    Args:
+        apex: (V, K, d), of which the highest of each contact, that is the first listed, is written to apex[0].
+        scratch: of `workspace`, with room for V cones at each contact.
+
+    Returns:
+        How many cones are listed, M >= K.
+    """
+    V, K, dim = apex.shape
+    of, tip = scratch[9], scratch[6][4]
+    M = K
+    for k in range(K):
+        top = 0
+        for v in range(1, V):
+            if apex[v, k, dim - 1] > apex[top, k, dim - 1]:
+                top = v
+        for a in range(dim):
+            apex[0, k, a], apex[top, k, a] = apex[top, k, a], apex[0, k, a]
+        of[k] = k
+        for a in range(3):
+            tip[k, a] = 0.0
+        first = M
+        for v in range(1, V):
+            n = apex[v, k, dim - 1] - apex[0, k, dim - 1]
+            t = apex[v, k, 0] - apex[0, k, 0]
+            o = apex[v, k, 1] - apex[0, k, 1] if dim == 3 else 0.0
+            if np.hypot(t, o) <= -mu[k] * n:  # contains the first cone
+                continue
+            covered = False
+            i = first
+            while i < M:
+                up, away = n - tip[i, 0], np.hypot(t - tip[i, 1], o - tip[i, 2])
+                if away <= -mu[k] * up:
+                    covered = True
+                    break
+                if away <= mu[k] * up:  # that one is covered by this
+                    M -= 1
+                    for a in range(3):
+                        tip[i, a] = tip[M, a]
+                else:
+                    i += 1
+            if not covered:
+                of[M], tip[M, 0], tip[M, 1], tip[M, 2] = k, n, t, o
+                M += 1
+    return M
+
+
+@kernel
+def guarded_wrench(J, b, Q_w, Q_f, mu, f_min, apex, f, w, scratch, guard):  # type: ignore[no-untyped-def]
+    """Write the optimal contact forces f (n,) and wrench w (nw,), and return their relative KKT residual.
+
+    Args:
+        f_min: (K,) floors [N], from 0.
+        apex: (V, K, d) of all cones; the highest of each contact takes the first place.
+        scratch: of `workspace`, for V cones at each contact.  guard: of `guard_scratch`.
+        Others: as `contact_wrench`.
+    """
+    K, dim = apex.shape[1:]
+    a, floor, left, linear = guard[0], guard[1], guard[2], guard[3]
+    cones = list_cones(apex, mu, scratch)
+    for k in range(K):
+        floor[k] = f_min[k]
+        for i in range(dim):
+            a[dim * k + i] = apex[0, k, i]
+    state_from_apex(J, b, Q_f, f_min, guard)
+    residual = _from_apex(J, left, Q_w, Q_f, mu, floor, cones, f, w, scratch, linear)
+    for i in range(f.shape[0]):
+        f[i] += a[i]
+    return residual
+
+
+@subroutine
+def _from_apex(J, b, Q_w, Q_f, mu, f_min, cones, f, w, scratch, linear):  # type: ignore[no-untyped-def]
+    """The same, where forces and floors count from the first apex of each contact, and `cones` are listed."""
+    n, K = f.shape[0], mu.shape[0]
+    if cones == K:
+        return contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch, linear)
+    work = opened(scratch, cones)
+    axes, h, size = work.axes, work.h, reduce(J, b, Q_w, Q_f, work.H, work.h, work.x)
+    for i in range(n):
+        h[i] -= linear[i]
+        size += h[i]
+    for i in range(cones):
+        size += work.tip[i, 0] + work.tip[i, 1] + work.tip[i, 2]
+    for i in range(n):
+        f[i] = np.nan
+    for i in range(w.shape[0]):
+        w[i] = np.nan
+    if not np.isfinite(size):
+        return np.nan
+    free_minimum(work.H, h, work)
+    constraints, gap, left, size = start(mu, f_min, axes, work)
+    best, least, stalled = np.inf, np.inf, 0
+    for _ in range(ITERATIONS):
+        if not gap + left < np.inf:
+            break
+        if gap + left < best:
+            best = gap + left
+            for i in range(n):
+                f[i] = work.now[i]
+            _keep(work)
+        if gap + left <= SMALLEST * size or stalled == STALLED:
+            break
+        alpha = predict(mu, f_min, axes, work)
+        sigma, second = (1.0 - alpha) ** 3, alpha * alpha  # see `contact_wrench`
+        if gap + left > 0.9 * least:
+            sigma, second = max(sigma, 0.5), 0.0
+        stalled = stalled + 1 if gap + left > 0.5 * least else 0
+        least = min(least, gap + left)
+        alpha = correct(mu, f_min, axes, sigma * max(gap, left) / constraints, second, work)
+        if alpha <= 1e-12:
+            break
+        gap, left, size = advance(mu, f_min, axes, alpha, work)
+    balancing_wrench(J, b, f, w)
+    gradient(J, Q_w, Q_f, w, f, work.pull, work.z, linear)
+    return _residual(J, b, Q_f, mu, f_min, f, w, linear, work)
+
+
+@subroutine
+def _keep(work):  # type: ignore[no-untyped-def]
+    """Keep the multipliers of an iterate, of the cones and of the floors."""
+    for i in range(work.of.shape[0]):
+        for a in range(3):
+            work.kept[i, a] = work.y[i, a]
+    for i in range(work.floor.shape[0]):
+        work.kept_floor[i] = work.floor[i, Q]
+
+
+@subroutine
+def _residual(J, b, Q_f, mu, f_min, f, w, linear, work):  # type: ignore[no-untyped-def]
+    """The greatest of the residuals of cones, dual cones, stationarity and complementarity, as in `kkt_residual`.
+
+    The gradient along f is in work.z, Q_w w in work.pull[0].
+    """
+    dim, n, K = len(work.axes), f.shape[0], mu.shape[0]
+    size_f = size_z = size_gap = gap = worst_f = worst_y = worst_z = 0.0
+    z = work.z
+    for i in range(w.shape[0]):
+        size_gap += abs(w[i] * work.pull[0, i])
+        if i < dim:
+            total = abs(w[i]) + abs(b[i])
+            for j in range(n):
+                total += abs(J[i, j] * f[j])
+            size_f = max(size_f, total)
+    for j in range(n):
+        total = abs(linear[j])
+        for i in range(n):
+            total += abs(Q_f[j, i] * f[i])
+        for i in range(w.shape[0]):
+            total += abs(J[i, j] * work.pull[0, i])
+        size_z = max(size_z, total)
+        size_gap += total * abs(f[j])
+    for i in range(work.of.shape[0]):
+        k = work.of[i]
+        t, e = k * dim, (k + 1) * dim - 1
+        s0, s1 = mu[k] * (f[e] - work.tip[i, 0]), f[t] - work.tip[i, 1]
+        s2 = f[t + 1] - work.tip[i, 2] if dim == 3 else 0.0
+        y0, y1, y2 = work.kept[i, 0], work.kept[i, 1], work.kept[i, 2]
+        size_f = max(size_f, abs(work.tip[i, 0]))
+        worst_f = max(worst_f, np.hypot(s1, s2) - s0)
+        worst_y = max(worst_y, np.hypot(y1, y2) - y0)
+        gap += s0 * y0 + s1 * y1 + s2 * y2
+        z[t], z[e] = z[t] - y1, z[e] - mu[k] * y0
+        if dim == 3:
+            z[t + 1] -= y2
+    for k in range(K):
+        e = (k + 1) * dim - 1
+        worst_f = max(worst_f, f_min[k] - f[e])
+        if f_min[k] > 0.0:
+            gap += (f[e] - f_min[k]) * work.kept_floor[k]
+            z[e] -= work.kept_floor[k]
+            worst_y = max(worst_y, -work.kept_floor[k])
+    for j in range(n):
+        worst_z = max(worst_z, abs(z[j]))
+    if not np.isfinite(size_f + size_z + size_gap + gap):
+        return np.nan
+    return max(max(worst_f / size_f, worst_y / size_z), max(worst_z / size_z, abs(gap) / size_gap))
