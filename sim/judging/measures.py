@@ -1,11 +1,13 @@
 """The monitor: what a run's raw readings say about sticking, tracking and the contact force."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.solution import FAILED, INACCURATE
+from pivoting.models.contact_softness import ContactRows
 from pivoting.sim.judging.implicit_step import unseen
 from pivoting.sim.judging.predicted_slip import RowEffects, drift, why_unknown
 
@@ -97,10 +99,9 @@ def _mismatch(run: "ContactMotion", steps: NDArray[np.bool_]) -> Array:
 
 def _penetration(run: "ContactMotion") -> Array:
     """(W,) greatest depth [m] beyond that at which the soft contact balances the load."""
-    rows = run.world.contact_rows
-    load = (run.force if run.certified else run.force_measured)[..., -1].sum(axis=-1)
-    explained = 0.0 if rows is None else rows.depth(np.nan_to_num(load) / rows.points)
-    return np.maximum(run.log.contacts.depth - explained, 0.0).max(axis=1)
+    predicted = run.certified and run.world.values is None  # where the worlds differ the load is another in each
+    load = (run.force if predicted else run.force_measured)[..., -1].sum(axis=-1)
+    return np.maximum(run.log.contacts.depth - run.world.depths(np.nan_to_num(load)), 0.0).max(axis=1)
 
 
 def _bounce(run: "ContactMotion") -> Array:
@@ -116,14 +117,46 @@ def predicted_slip(run: "ContactMotion") -> Array:
 
     Not-a-number from where it cannot.
     """
-    if run.world.contact_rows is None:
-        return np.full(run.slip.shape, np.nan)
-    point, omega = run.stepped[..., None, :], run.angular_velocity @ run.table_axes
-    turning, touching = run.turning - point, run.lever - point
-    path = drift(
-        run.world.contact_rows, _held(run), turning, touching, run.stepped_velocity, omega, unseen(run), _settle(run)
+    rows = [each.rows for each in run.world.truths]
+    given = (
+        _held(run),
+        run.turning - run.stepped[..., None, :],
+        run.lever - run.stepped[..., None, :],
+        run.stepped_velocity,
+        run.angular_velocity @ run.table_axes,
+        unseen(run),
     )
+    if len(rows) == 1:
+        return run.since_held(_drift(rows[0], given, run))
+    path = np.empty(run.slip.shape)
+    for first, worlds in _alike(rows):
+        path[worlds] = _drift(first, _of_worlds(given, worlds), run)
     return run.since_held(path)
+
+
+def _drift(rows: ContactRows | None, given: tuple[Any, ...], run: "ContactMotion") -> Array:
+    """Of worlds with the same law of the contact rows."""
+    if rows is None:
+        return np.full((len(given[1]), *run.slip.shape[1:]), np.nan)
+    return drift(rows, *given, _settle(run))
+
+
+def _alike(rows: Sequence[ContactRows | None]) -> Iterator[tuple[ContactRows | None, NDArray[np.intp]]]:
+    """The worlds whose drift follows from the same numbers of their rows, and the rows of the first of them."""
+    laws = [None if each is None else (each.b, each.h, each.unknown) for each in rows]
+    for law in dict.fromkeys(laws):
+        worlds = np.flatnonzero([each == law for each in laws])
+        yield rows[worlds[0]], worlds
+
+
+def _of_worlds(values: Any, worlds: NDArray[np.intp]) -> Any:
+    """Those of some worlds, of an array or of all arrays of a tuple."""
+    if values is None:
+        return None
+    if isinstance(values, tuple):
+        parts = [_of_worlds(value, worlds) for value in values]
+        return type(values)(*parts) if hasattr(values, "_fields") else tuple(parts)
+    return values[worlds]
 
 
 def _held(run: "ContactMotion") -> RowEffects:

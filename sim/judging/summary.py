@@ -10,6 +10,7 @@ from pivoting.models.frames import matrix
 from pivoting.models.names import geom_name
 from pivoting.models.rigid_body import file_frame, laid_over
 from pivoting.sim.pipeline.plan_log import plan_figures
+from pivoting.sim.scenarios.intervals import spelled
 
 if TYPE_CHECKING:
     from pivoting.sim.experiment import Experiment
@@ -29,7 +30,7 @@ def summary(run: "Experiment") -> dict[str, Any]:
         "length_unit_m": run.unit,
         "contacts": (run.unit * run.points).tolist(),
         "radius": (run.unit * run.world.radius).tolist(),
-        "changes": run.scenario.changes,
+        "changes": {key: spelled(value) for key, value in run.scenario.changes.items()},
         "resolved": run.scenario.resolved(run.load),
         "limits": asdict(run.limits),
         "controller": run.controller,

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pivoting.controller.control_laws import FORMULATIONS
 from pivoting.controller.planning.integrators import INTEGRATORS
 from pivoting.controller.references import REFERENCES, Reference
+from pivoting.controller.uncertainty.uncertainty import Interval
 from pivoting.models.mujoco_constants import LEAST_FRICTION
 from pivoting.sim.scenarios.key_declaration import Needs, declared_keys, key
 
@@ -20,6 +21,7 @@ BOUNDS = "the bounds on the wrench, in object axes"
 HORIZON = "the receding horizon"
 STAGES = "the stages before and after the controller"
 SIMULATOR = "the simulator"
+UNCERTAINTY = "what the controller does not know exactly, beside the object's keys that are intervals"
 
 SCENE = "as the scene has it"
 
@@ -33,11 +35,24 @@ _MADE_OF = Needs("reference", _made_of)
 _PLANS, _PLANS_OR_PLAYS = Needs("plan_hz"), Needs("plan_hz", open_loop=True)
 
 
+def _com_key(axis: str) -> None:
+    """The key of one coordinate of the centre of mass."""
+    return key(
+        None,
+        f"centre of mass, from where the scene has it along the object's {axis} axis",
+        group=OBJECT,
+        unit="m",
+        at_least=-1e3,
+        at_most=1e3,
+        none="com",
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class ScenarioKeys:
     """The values of a scenario that `--set` changes. Angles are in degrees here and in radians everywhere else."""
 
-    mu: float | None = key(
+    mu: float | Interval | None = key(
         None,
         f"friction coefficient between the object and its support (MuJoCo needs more than {LEAST_FRICTION:g})",
         group=OBJECT,
@@ -45,7 +60,29 @@ class ScenarioKeys:
         at_most=10.0,
         none=SCENE,
     )
-    mass: float | None = key(None, "mass of the object", group=OBJECT, unit="kg", above=0.0, none=SCENE)
+    mass: float | Interval | None = key(
+        None, "mass of the object", group=OBJECT, unit="kg", above=0.0, none=SCENE
+    )
+    inertia: float | Interval | None = key(
+        None,
+        "factor on the inertia about the centre of mass that the object has with the mass that is believed",
+        group=OBJECT,
+        above=0.0,
+        at_most=1e6,
+        none="in proportion to the mass",
+    )
+    com: float | Interval | None = key(
+        None,
+        "com_x, com_y and com_z at once, as far as the object moves along them",
+        group=OBJECT,
+        unit="m",
+        at_least=-1e3,
+        at_most=1e3,
+        none="0",
+    )
+    com_x: float | Interval | None = _com_key("x")
+    com_y: float | Interval | None = _com_key("y")
+    com_z: float | Interval | None = _com_key("z")
     size: float | None = key(
         None,
         "longest side of the object, which has to be a single box",
@@ -232,6 +269,38 @@ class ScenarioKeys:
         needs=_PLANS_OR_PLAYS,
     )
 
+    shove: float = key(
+        0.0,
+        "greatest impulse of a shove at the centre of mass, in any direction, for each kg",
+        group=UNCERTAINTY,
+        unit="N s/kg",
+        at_least=0.0,
+        at_most=1e3,
+    )
+    theta_error: float = key(
+        0.0,
+        "greatest error of the measured orientation about any axis",
+        group=UNCERTAINTY,
+        unit="deg",
+        at_least=0.0,
+        at_most=90.0,
+    )
+    omega_error: float = key(
+        0.0,
+        "greatest error of the measured angular velocity about any axis",
+        group=UNCERTAINTY,
+        unit="deg/s",
+        at_least=0.0,
+        at_most=1e5,
+    )
+    worlds_at: str = key(
+        "drawn",
+        "which members of the set of intervals the worlds are",
+        group=UNCERTAINTY,
+        words={"drawn": "at random, each by its number and the seed", "vertices": "each vertex in turn"},
+        needs=Needs("differing", said="a key of the object is an interval"),
+    )
+
     noise: float = key(
         0.0,
         "greatest error of the measured orientation about each axis, drawn anew in each step",
@@ -287,7 +356,9 @@ def _of(*groups: str) -> tuple[str, ...]:
     return tuple(name for name, declared in KEYS.items() if declared.group in groups)
 
 
-SCENE_KEYS = _of(OBJECT, SIMULATOR)  # each of which is a change of `models.scene_changes`
+COM_KEYS = ("com_x", "com_y", "com_z")  # for which "com" stands
+SCENE_KEYS = tuple(name for name in _of(OBJECT, SIMULATOR) if name != "com")  # the changes of `models.scene_changes`
+SET_KEYS = ("mass", "inertia", "mu", *COM_KEYS)  # that may be intervals, in the order of `Uncertainty`
 HIDDEN_KEYS = _of(OBJECT)  # that the world may have and no one know
 CONTROL_KEYS = _of(CONTROLLER)  # of the controller alone
 BOUND_KEYS = _of(BOUNDS)
