@@ -56,8 +56,8 @@ def set_object_values(
         model: as it was compiled, of a body that is not "simple" where its CoM is to move; changed.
         data: of the model, scratch.
         body, support: ids of the body and of the geom that it stands on.
-        values: by `OBJECT_VALUES`: the mass [kg], the inertia in proportion to it; a factor on that inertia; the sliding
-            friction of the body and its support; and where the CoM is, from where it was, along `axes` [m].
+        values: by `OBJECT_VALUES`: the mass [kg], the inertia in proportion to it; a factor on that inertia; the
+            sliding friction of the body and its support; where the CoM is, from where it was, along `axes` [m].
         axes: (3, 3) object axes in the body frame, along which `COM` counts; of one along which it does not, 0.
         unit: of the model's lengths [m].
     """

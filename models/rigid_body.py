@@ -28,7 +28,7 @@ class RigidBody:
         dim: 2 (two slides and a hinge) or 3 (a free joint).
         mass: [kg].  inertia: about the CoM [kg m^2]; in the plane a number, in space (3, 3) in object axes.
         com: (3,) CoM in the body frame [m].
-        axes: (4,) quaternion, object axes to body frame.
+        axes: (4,) quaternion, object axes to body frame.  normal: (3,) the second of them, in the plane its normal.
         surface: what it stands on.
         table: (4,) quaternion of the table's frame (t, o, n) in the world; t is to the right, n the support's normal.
         gravity: (3,) world axes [m/s^2].
@@ -42,6 +42,7 @@ class RigidBody:
     inertia: float | Array
     com: Array
     axes: Array
+    normal: Array
     surface: Surface
     table: Array
     gravity: Array
@@ -121,9 +122,10 @@ def read_body(model: mujoco.MjModel, name: str, support: str | None = None) -> R
         index=index,
         dim=dim,
         mass=float(model.body_mass[index]),
-        inertia=_inertia(model, index, dim, axes),
+        inertia=_inertia(model, index, dim, axes[:, 1]),
         com=np.array(model.body_ipos[index]),
         axes=quaternion(axes),
+        normal=axes[:, 1],
         surface=surface,
         table=quaternion(table),
         gravity=gravity,
@@ -136,16 +138,16 @@ def with_inertia_of(body: RigidBody, model: mujoco.MjModel) -> RigidBody:
     return replace(
         body,
         mass=float(model.body_mass[body.index]),
-        inertia=_inertia(model, body.index, body.dim, matrix(body.axes)),
+        inertia=_inertia(model, body.index, body.dim, body.normal),
         com=np.array(model.body_ipos[body.index]),
     )
 
 
-def _inertia(model: mujoco.MjModel, index: int, dim: int, axes: Array) -> float | Array:
-    """About the CoM; in the plane about its normal, the second of the object's axes (3, 3), in space (3, 3)."""
+def _inertia(model: mujoco.MjModel, index: int, dim: int, normal: Array) -> float | Array:
+    """About the CoM; in the plane about its normal (3,), body frame, in space (3, 3)."""
     inertial = matrix(model.body_iquat[index])
     tensor = inertial @ np.diag(model.body_inertia[index]) @ inertial.T
-    return float(axes[:, 1] @ tensor @ axes[:, 1]) if dim == 2 else tensor
+    return float(normal @ tensor @ normal) if dim == 2 else tensor
 
 
 def in_plane_axes(body: RigidBody) -> Array:

@@ -4,8 +4,8 @@ import numpy as np
 from pivoting.controller.uncertainty.uncertainty import Interval, Uncertainty
 from pivoting.controller.validate import fail
 from pivoting.models.rigid_body import RigidBody
+from pivoting.sim.scenarios.object_keys import COM_KEYS
 from pivoting.sim.scenarios.scenario import Scenario
-from pivoting.sim.scenarios.scenario_keys import COM_KEYS
 from pivoting.sim.scenarios.set_values import believed_values
 
 

@@ -55,6 +55,7 @@ class DifferingWorlds:
         believed: mass that the controller takes for nominal [kg].
         at: (3,) the point that it takes for the CoM, body frame [m].
         mu: friction where the worlds have none of their own.
+        rows: the contact rows of the world in the middle.
         pressed: qpos (nq,) of the object pressed on its contact along its motion.
         chosen: whether the contacts' parameters are chosen for each world.
         unit: of the models' lengths [m].
@@ -67,6 +68,7 @@ class DifferingWorlds:
     believed: float
     at: Array
     mu: float
+    rows: ContactRows | None
     pressed: tuple[Array, ...]
     chosen: bool
     unit: float
@@ -104,12 +106,26 @@ class DifferingWorlds:
     @cached_property
     def truths(self) -> tuple[Truth, ...]:
         """Of each world."""
-        columns, found = self.values.columns, []
+        columns, found, pressed = self.values.columns, [], self._pressed()
         mu = columns.get("mu", np.full(self.worlds, self.mu)).tolist()
         for world, model in enumerate(self.models()):
-            rows = read_rows(model, self.body.index, self.body.support, self.pressed)
+            rows = self._rows(model, pressed)
             found.append(Truth.of(with_inertia_of(self.body, model), self.at, mu[world], rows))
         return tuple(found)
+
+    def _rows(self, model: mujoco.MjModel, pressed: Array | None) -> ContactRows | None:
+        """Of a world's own model, from one placement: what is the same all the way along is known."""
+        if self.rows is None or pressed is None:
+            return None
+        own = read_rows(model, self.body.index, self.body.support, [pressed])
+        assert own is not None, "it touches where it touched"
+        mu = own.mu if "mu" in self.values.names else self.rows.mu
+        return self.rows._replace(D=own.D, b=own.b, k=own.k, solimp=own.solimp, mu=mu)
+
+    def _pressed(self) -> Array | None:
+        """The first placement in which there is a contact."""
+        body = self.body
+        return next((at for at in self.pressed if read_rows(self.bare, body.index, body.support, [at])), None)
 
     def fill(self, batch: Batch) -> None:
         """Give each world of a batch of the bare model what it has of its own."""
@@ -122,7 +138,7 @@ class DifferingWorlds:
 
 
 def scene_values(values: Mapping[str, float], believed: float) -> dict[str, float]:
-    """What a scene takes of a scenario's values: the factor on an inertia that is in proportion to the world's own mass.
+    """What a scene takes of a scenario's values: its factor is on an inertia in proportion to the world's own mass.
 
     Args:
         believed: mass that the controller takes for nominal [kg], with which the scenario's factor counts.

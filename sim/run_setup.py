@@ -10,12 +10,13 @@ from pivoting.controller.references import Reference
 from pivoting.controller.validate import fail, frozen
 from pivoting.controller.wrench_bounds import WrenchBounds
 from pivoting.models.frames import matrix
+from pivoting.models.object_values import check_friction
 from pivoting.models.scenes import load
 from pivoting.sim.belief import Believed, Controllers, believe
 from pivoting.sim.pipeline.stages import Setting
 from pivoting.sim.placement import Placement
+from pivoting.sim.scenarios.object_keys import COM_KEYS
 from pivoting.sim.scenarios.scenario import Scenario
-from pivoting.sim.scenarios.scenario_keys import COM_KEYS
 from pivoting.sim.start_states import Samples
 from pivoting.sim.world import World, build_world
 from pivoting.sim.world_values import WorldValues, drawn_values, vertex_values
@@ -72,9 +73,7 @@ class Begun(NamedTuple):
         """The same for some of the worlds, from that with the index `first` on."""
         setting = self.setting
         some = setting._replace(worlds=worlds, first_world=setting.first_world + first)
-        return self._replace(
-            setting=some, belief=self.belief.part(first, worlds), world=self.world.part(first, worlds)
-        )
+        return self._replace(setting=some, belief=self.belief.part(first, worlds), world=self.world.part(first, worlds))
 
 
 def set_up(
@@ -110,6 +109,10 @@ def _values(case: Scenario, belief: Believed, seed: int, worlds: int, first: int
         return None
     across = COM_KEYS[1] if belief.placement.body.dim == 2 else ""  # the plane, where it does nothing
     sets = {key: interval for key, interval in case.differing.items() if key != across}
+    if not sets:
+        return None
+    if "mu" in sets:
+        check_friction(sets["mu"].low)
     if case.worlds_at == "vertices":
         return vertex_values(sets, worlds, first)
     return drawn_values(sets, seed, worlds, first)

@@ -22,7 +22,7 @@ class ContactMotion(Trajectory):
 
     @cached_property
     def turning(self) -> Array:
-        """(W, N+1, K, 3) from `position` to the material contact points, or the centres of what rolls, table axes [m]."""
+        """(W, N+1, K, 3) from `position` to the material contact points, or centres of what rolls, table axes [m]."""
         return frozen(self.from_com(self.points))
 
     @cached_property

@@ -102,7 +102,7 @@ class World:
 
     @cached_property
     def offsets(self) -> Array | None:
-        """(W or 1, 3) from the CoM to the point at which the wrench acts, object axes [m]; None where that is the CoM."""
+        """(W or 1, 3) from the CoM to where the wrench acts, object axes [m]; None where that is the CoM."""
         offsets = np.array([each.offset for each in self.truths])
         return offsets if offsets.any() else None
 
@@ -112,8 +112,8 @@ class World:
             return np.zeros(loads.shape)
         if self.differing is None:
             return self.contact_rows.depth(loads / self.contact_rows.points)
-        own = [each.rows for each in self.truths]
-        return np.array([rows.depth(load / rows.points) if rows else 0.0 * load for rows, load in zip(own, loads, strict=True)])
+        each = zip((truth.rows for truth in self.truths), loads, strict=True)
+        return np.array([0.0 * load if rows is None else rows.depth(load / rows.points) for rows, load in each])
 
     def part(self, first: int, worlds: int) -> "World":
         """The same for some of the worlds, from that with the index `first` on."""
@@ -168,42 +168,47 @@ def build_world(
         settings = contact_settings(model, truth.index, truth.support, pressed, float(model.opt.timestep))
         set_contact_settings(model, truth.index, truth.support, settings)
     lift = space(truth.dim).lift
-    mu = read_friction(model, truth.index, truth.support, there.contacts)
-    return World(
+    world = World(
         model=model,
         sensors=sensors,
         truth=truth,
         placement=there,
         declared=_declared(model, counted, there, case),
         face=np.array([lift(counted.point(corner)) for corner in there.face]),
-        mu=mu,
+        mu=read_friction(model, truth.index, truth.support, there.contacts),
         contact_rows=read_rows(model, truth.index, truth.support, pressed),
         settings=settings,
         replaced=actual.replaced,
         unit=actual.unit,
         warned=actual.warned,
-        values=values,
-        differing=None if values is None else _differing(case, actual, placed, values, mu, pressed, chosen),
     )
+    if values is None:
+        return world
+    return replace(world, values=values, differing=_differing(case, actual, placed, world, pressed, values))
 
 
 def _differing(
-    case: Scenario,
-    actual: Scene,
-    placed: Placement,
-    values: WorldValues,
-    mu: float,
-    pressed: tuple[Array, ...],
-    chosen: bool,
+    case: Scenario, actual: Scene, placed: Placement, nominal: World, pressed: tuple[Array, ...], values: WorldValues
 ) -> DifferingWorlds:
-    """The worlds that have these values of their own, of the scene in the middle of them."""
-    bare, _ = _instrumented(replace(actual, values={}), placed.body.com)
+    """The worlds that have these values of their own, about the nominal one of a scene."""
+    at = nominal.applied_at
+    bare, _ = _instrumented(replace(actual, values={}), at)
     body = read_body(bare, actual.body, actual.support)
     shared = {key: value for key, value in case.actual.items() if key in OBJECT_VALUES}
     if any(name in shared for name in COM):
         free_the_com(bare, body.index)
     return DifferingWorlds(
-        values, shared, bare, body, placed.body.mass, placed.body.com, mu, pressed, chosen, actual.unit
+        values=values,
+        shared=shared,
+        bare=bare,
+        body=body,
+        believed=placed.body.mass,
+        at=at,
+        mu=nominal.mu,
+        rows=nominal.contact_rows,
+        pressed=pressed,
+        chosen=nominal.settings is not None,
+        unit=nominal.unit,
     )
 
 
@@ -213,7 +218,7 @@ def _changes(case: Scenario, placed: Placement) -> dict[str, float]:
 
 
 def _instrumented(scene: Scene, at: Array) -> tuple[mujoco.MjModel, dict[str, slice]]:
-    """The model that is simulated, with sensors at a point (3,) of the body, and where each reading is in sensordata."""
+    """The model that is simulated, and where each reading is in its sensordata; of the pose: at (3,) of the body."""
     model, sensors = instrument(scene, at)
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that diverges is seen, not reset
     # bodies of several geoms: a plane's bounding box is 5e9 m deep there, and misses contacts of less than 1e-6 m

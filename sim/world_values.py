@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pivoting.controller.uncertainty.uncertainty import Interval
 from pivoting.controller.validate import frozen
 from pivoting.sim.pipeline.random_draws import Draws
-from pivoting.sim.scenarios.scenario_keys import SET_KEYS
+from pivoting.sim.scenarios.object_keys import SET_KEYS
 
 Array = NDArray[np.float64]
 

@@ -47,9 +47,9 @@ class Scenario(ScenarioKeys):
     moment with the lever from contact to CoM, of a rate per second; durations to its natural time, "3T"; see
     `relative_values`. `absolute` resolves them.
 
-    mass, inertia, mu and the coordinates of the centre of mass may be intervals, (0.8, 1.2) or "0.8:1.2": the controller
-    is told that they are somewhere in there, takes the middle for nominal, and each world has its own, see `worlds_at`,
-    unless `world` says which. Intervals in `world` are of the worlds alone.
+    mass, inertia, mu and the coordinates of the centre of mass may be intervals, (0.8, 1.2) or "0.8:1.2": the
+    controller is told that they are somewhere in there and takes the middle for nominal, and each world has its own,
+    see `worlds_at`, unless `world` says which. Intervals in `world` are of the worlds alone.
 
     Attributes:
         name, summary: shown by `pivoting list`.
@@ -138,6 +138,11 @@ class Scenario(ScenarioKeys):
     def differing(self) -> Mapping[str, Interval] | None:
         """The intervals, by key of the object, from which each world has a value of its own; None: they are alike."""
         return differing_values(self) or None
+
+    @property
+    def in_sets(self) -> bool:
+        """Whether anything of the object is an interval, to the controller or in the world."""
+        return any(isinstance(value, Interval) for value in (*believed_values(self).values(), *self.world.values()))
 
     @property
     def reference_keys(self) -> tuple[str, ...]:

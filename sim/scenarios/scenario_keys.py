@@ -5,16 +5,14 @@ from dataclasses import dataclass
 from pivoting.controller.control_laws import FORMULATIONS
 from pivoting.controller.planning.integrators import INTEGRATORS
 from pivoting.controller.references import REFERENCES, Reference
-from pivoting.controller.uncertainty.uncertainty import Interval
-from pivoting.models.mujoco_constants import LEAST_FRICTION
 from pivoting.sim.scenarios.key_declaration import Needs, declared_keys, key
+from pivoting.sim.scenarios.object_keys import OBJECT, SCENE, ObjectKeys
 
 LOWEST = 0.1  # [deg] from a face: closer, the next corner touches the table too
 ANY_ANGLE = {"at_least": -360.0, "at_most": 360.0}  # [deg] of an object whose plan knows what its shape allows
 LARGEST = 1e30  # [N] so that squares of forces are finite
 
 # What the keys are of. Those of the object may be believed to be other than they are, see `Scenario.world`.
-OBJECT = "the object and its support; as world.KEY of the world alone, which the controller does not know of"
 REFERENCE = "the reference"
 CONTROLLER = "the controller"
 BOUNDS = "the bounds on the wrench, in object axes"
@@ -22,8 +20,6 @@ HORIZON = "the receding horizon"
 STAGES = "the stages before and after the controller"
 SIMULATOR = "the simulator"
 UNCERTAINTY = "what the controller does not know exactly, beside the object's keys that are intervals"
-
-SCENE = "as the scene has it"
 
 
 def _made_of(key: str) -> tuple[str, ...]:
@@ -35,81 +31,9 @@ _MADE_OF = Needs("reference", _made_of)
 _PLANS, _PLANS_OR_PLAYS = Needs("plan_hz"), Needs("plan_hz", open_loop=True)
 
 
-def _com_key(axis: str) -> None:
-    """The key of one coordinate of the centre of mass."""
-    return key(
-        None,
-        f"centre of mass, from where the scene has it along the object's {axis} axis",
-        group=OBJECT,
-        unit="m",
-        at_least=-1e3,
-        at_most=1e3,
-        none="com",
-    )
-
-
 @dataclass(frozen=True, kw_only=True)
-class ScenarioKeys:
+class ScenarioKeys(ObjectKeys):
     """The values of a scenario that `--set` changes. Angles are in degrees here and in radians everywhere else."""
-
-    mu: float | Interval | None = key(
-        None,
-        f"friction coefficient between the object and its support (MuJoCo needs more than {LEAST_FRICTION:g})",
-        group=OBJECT,
-        above=0.0,
-        at_most=10.0,
-        none=SCENE,
-    )
-    mass: float | Interval | None = key(
-        None, "mass of the object", group=OBJECT, unit="kg", above=0.0, none=SCENE
-    )
-    inertia: float | Interval | None = key(
-        None,
-        "factor on the inertia about the centre of mass that the object has with the mass that is believed",
-        group=OBJECT,
-        above=0.0,
-        at_most=1e6,
-        none="in proportion to the mass",
-    )
-    com: float | Interval | None = key(
-        None,
-        "com_x, com_y and com_z at once, as far as the object moves along them",
-        group=OBJECT,
-        unit="m",
-        at_least=-1e3,
-        at_most=1e3,
-        none="0",
-    )
-    com_x: float | Interval | None = _com_key("x")
-    com_y: float | Interval | None = _com_key("y")
-    com_z: float | Interval | None = _com_key("z")
-    size: float | None = key(
-        None,
-        "longest side of the object, which has to be a single box",
-        group=OBJECT,
-        unit="m",
-        above=0.0,
-        at_most=1e3,
-        none=SCENE,
-    )
-    incline: float | None = key(
-        None,
-        "angle by which the support rises to the right",
-        group=OBJECT,
-        unit="deg",
-        above=-90.0,
-        below=90.0,
-        none=SCENE,
-    )
-    gravity: float | None = key(
-        None,
-        "magnitude of gravity, whose direction stays that of the scene",
-        group=OBJECT,
-        unit="m/s^2",
-        at_least=0.0,
-        at_most=1e3,
-        none=SCENE,
-    )
 
     reference: str | Reference = key(
         "constant", "motion that the object is to follow", group=REFERENCE, words=REFERENCES
@@ -356,9 +280,7 @@ def _of(*groups: str) -> tuple[str, ...]:
     return tuple(name for name, declared in KEYS.items() if declared.group in groups)
 
 
-COM_KEYS = ("com_x", "com_y", "com_z")  # for which "com" stands
 SCENE_KEYS = tuple(name for name in _of(OBJECT, SIMULATOR) if name != "com")  # the changes of `models.scene_changes`
-SET_KEYS = ("mass", "inertia", "mu", *COM_KEYS)  # that may be intervals, in the order of `Uncertainty`
 HIDDEN_KEYS = _of(OBJECT)  # that the world may have and no one know
 CONTROL_KEYS = _of(CONTROLLER)  # of the controller alone
 BOUND_KEYS = _of(BOUNDS)

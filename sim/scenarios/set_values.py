@@ -1,10 +1,11 @@
-"""What a scenario says of its object, to the controller and of the world: numbers, and intervals of which sets are made."""
+"""What a scenario says of its object, to the controller and of the world: numbers, and intervals that make a set."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from pivoting.controller.uncertainty.uncertainty import Interval
-from pivoting.sim.scenarios.scenario_keys import COM_KEYS, SCENE_KEYS, SET_KEYS
+from pivoting.sim.scenarios.object_keys import COM_KEYS, SET_KEYS
+from pivoting.sim.scenarios.scenario_keys import SCENE_KEYS
 
 if TYPE_CHECKING:
     from pivoting.sim.scenarios.scenario import Scenario
