@@ -4,6 +4,29 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+
+class ContactParts(NamedTuple):
+    """What has the parameters of the contacts between a body and its support.
+
+    Attributes:
+        geoms: (ngeom,) which geoms, the support's among them.  pairs: (npair,) which explicit pairs.
+        overrides: whether the option's own take the place of all geoms', by <flag override="enable"/>.
+    """
+
+    geoms: NDArray[np.bool_]
+    pairs: NDArray[np.bool_]
+    overrides: bool
+
+
+def contact_parts(model: mujoco.MjModel, body: int, support: int) -> ContactParts:
+    """Of a body and the geom that it stands on, by their ids."""
+    own = model.geom_bodyid == body
+    pairs = own[model.pair_geom1] | own[model.pair_geom2]
+    overrides = bool(model.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE))
+    return ContactParts(own | (np.arange(model.ngeom) == support), pairs, overrides)
 
 
 class BodyContact(NamedTuple):

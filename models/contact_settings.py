@@ -17,7 +17,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.models.body_contacts import forced
+from pivoting.models.body_contacts import contact_parts, forced
 from pivoting.models.rigid_body import initial_data
 
 Array = NDArray[np.float64]
@@ -25,6 +25,9 @@ STIFF = 2.1  # time constant of the contacts, in time steps: see settings.xml
 IMPEDANCE = 0.5  # see settings.xml
 COUPLED = 9.0  # coupling up to which settings.xml serves: the normal rows' ringing dies as fast as the friction rows'
 RINGING = COUPLED / (COUPLED + 1.0) * (8.0 / STIFF + 2.0 / STIFF**2)  # share (2 b h + k d h^2) there
+
+
+SETTINGS_FIELDS = ("geom_solref", "geom_solimp", "pair_solref", "pair_solimp", "opt.o_solref", "opt.o_solimp")
 
 
 class ContactSettings(NamedTuple):
@@ -86,6 +89,16 @@ def contact_settings(
         alone=alone,
         reason=f"{told}: " + ("made softer, or they would bounce" if softened else "as in the shipped scenes"),
     )
+
+
+def set_contact_settings(model: mujoco.MjModel, body: int, support: int, settings: ContactSettings) -> None:
+    """Give a body and its support these contact parameters."""
+    geoms, pairs, overrides = contact_parts(model, body, support)
+    solref, solimp = (settings.timeconst, settings.dampratio), settings.impedance
+    model.geom_solref[geoms, :2], model.geom_solimp[geoms, :2] = solref, solimp
+    model.pair_solref[pairs, :2], model.pair_solimp[pairs, :2] = solref, solimp
+    if overrides:
+        model.opt.o_solref[:2], model.opt.o_solimp[:2] = solref, solimp
 
 
 def _inverse_inertia(model: mujoco.MjModel, data: mujoco.MjData, body: int, support: int) -> Array:

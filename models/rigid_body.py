@@ -1,6 +1,6 @@
 """Reading a compiled model: mass, inertia, centre of mass and plane of a body, and what it stands on; placing it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -28,7 +28,7 @@ class RigidBody:
         dim: 2 (two slides and a hinge) or 3 (a free joint).
         mass: [kg].  inertia: about the CoM [kg m^2]; in the plane a number, in space (3, 3) in object axes.
         com: (3,) CoM in the body frame [m].
-        axes: (4,) quaternion, object axes to body frame.
+        axes: (4,) quaternion, object axes to body frame.  normal: (3,) the second of them, in the plane its normal.
         surface: what it stands on.
         table: (4,) quaternion of the table's frame (t, o, n) in the world; t is to the right, n the support's normal.
         gravity: (3,) world axes [m/s^2].
@@ -42,6 +42,7 @@ class RigidBody:
     inertia: float | Array
     com: Array
     axes: Array
+    normal: Array
     surface: Surface
     table: Array
     gravity: Array
@@ -116,21 +117,45 @@ def read_body(model: mujoco.MjModel, name: str, support: str | None = None) -> R
     gravity = np.zeros(3) if weightless else np.array(model.opt.gravity)
     table = surface.axes if normal is None else _table_axes(surface.axes[:, 2], normal, gravity)
     axes = np.eye(3) if normal is None else _object_axes(data.xmat[index].reshape(3, 3).T @ table[:, 1])
-    inertial = matrix(model.body_iquat[index])
-    tensor = inertial @ np.diag(model.body_inertia[index]) @ inertial.T
     return RigidBody(
         name=body_name(model, index),
         index=index,
         dim=dim,
         mass=float(model.body_mass[index]),
-        inertia=float(axes[:, 1] @ tensor @ axes[:, 1]) if dim == 2 else tensor,
+        inertia=_inertia(model, index, dim, axes[:, 1]),
         com=np.array(model.body_ipos[index]),
         axes=quaternion(axes),
+        normal=axes[:, 1],
         surface=surface,
         table=quaternion(table),
         gravity=gravity,
         drag=read_drag(model, data, index),
     )
+
+
+def with_inertia_of(body: RigidBody, model: mujoco.MjModel) -> RigidBody:
+    """The body with the mass, the inertia and the CoM that it has in another model of the same scene."""
+    return replace(
+        body,
+        mass=float(model.body_mass[body.index]),
+        inertia=_inertia(model, body.index, body.dim, body.normal),
+        com=np.array(model.body_ipos[body.index]),
+    )
+
+
+def _inertia(model: mujoco.MjModel, index: int, dim: int, normal: Array) -> float | Array:
+    """About the CoM; in the plane about its normal (3,), body frame, in space (3, 3)."""
+    inertial = matrix(model.body_iquat[index])
+    tensor = inertial @ np.diag(model.body_inertia[index]) @ inertial.T
+    return float(normal @ tensor @ normal) if dim == 2 else tensor
+
+
+def in_plane_axes(body: RigidBody) -> Array:
+    """(3, 3) object axes as columns, body frame; 0 in place of the one across the plane that the body moves in."""
+    axes = matrix(body.axes)
+    if body.dim == 2:
+        axes[:, 1] = 0.0
+    return axes
 
 
 def file_frame(model: mujoco.MjModel, body: int) -> tuple[Array, Array]:

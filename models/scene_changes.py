@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from pivoting.models.errors import ModelError
-from pivoting.models.mujoco_constants import LEAST_FRICTION
+from pivoting.models.object_values import COM, check_friction
 
 INERTIA_FROM_GEOM = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
 _GRAVITY_OFF = int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
@@ -25,7 +25,7 @@ class Edit:
         unit: of the spec's lengths [m].
         geoms, table: the body's geoms, and the support.
         parts: all that has parameters of their contacts: these geoms, the support, and explicit pairs.
-        mass: that the body is to have once it is compiled [kg], if it is changed.
+        values: that the body is to have once it is compiled, see `object_values`.
         scale: by which its size is changed.
     """
 
@@ -35,7 +35,7 @@ class Edit:
     geoms: list[Any]
     table: Any
     parts: list[Any]
-    mass: float | None
+    values: dict[str, float]
     scale: float
 
     @property
@@ -74,7 +74,22 @@ def _size(edit: Edit, size: float) -> None:
 
 def _mass(edit: Edit, mass: float) -> None:
     """The mass of the body [kg], its inertia in proportion."""
-    edit.mass = mass
+    edit.values["mass"] = mass
+
+
+def _inertia(edit: Edit, factor: float) -> None:
+    """A factor on the inertia about the CoM that the body has with its mass."""
+    edit.values["inertia"] = factor
+
+
+def _com(axis: str) -> "Change":
+    """What moves the CoM along one of the object's axes [m]."""
+
+    def move(edit: Edit, offset: float) -> None:
+        edit.spec.body(edit.body).simple = False  # of a simple body the compiler takes it that its CoM stays
+        edit.values[axis] = offset
+
+    return move
 
 
 def _incline(edit: Edit, incline: float) -> None:
@@ -90,14 +105,8 @@ def _incline(edit: Edit, incline: float) -> None:
 
 def _friction(edit: Edit, mu: float) -> None:
     """The sliding friction of the body and its support."""
-    if mu <= LEAST_FRICTION:
-        raise ModelError(
-            f"mu = {mu:g}: must be > {LEAST_FRICTION:g}, which is the least friction coefficient that MuJoCo simulates"
-        )
-    for part in edit.parts:
-        part.friction[: 2 if isinstance(part, mujoco.MjsPair) else 1] = mu
-    if edit.overrides:
-        edit.spec.option.o_friction[:2] = mu
+    check_friction(mu)
+    edit.values["mu"] = mu
 
 
 def _time_constant(edit: Edit, timeconst: float) -> None:
@@ -133,5 +142,7 @@ CHANGES: Mapping[str, Change] = MappingProxyType(  # by key, in the order in whi
         "timeconst": _time_constant,
         "impedance": _impedance,
         "mass": _mass,
+        "inertia": _inertia,
+        **{axis: _com(axis) for axis in COM},
     }
 )

@@ -9,12 +9,13 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from pivoting.models.contact_settings import STIFF, ContactSettings
+from pivoting.models.contact_settings import STIFF
 from pivoting.models.errors import ModelError
 from pivoting.models.frames import Array
 from pivoting.models.length_unit import length_unit
-from pivoting.models.names import body_id, body_name
-from pivoting.models.rigid_body import FILE_FRAME, degrees_of_freedom, initial_data
+from pivoting.models.names import body_id, body_name, geom_id
+from pivoting.models.object_values import COM, free_the_com, set_object_values
+from pivoting.models.rigid_body import FILE_FRAME, degrees_of_freedom, in_plane_axes, initial_data, read_body
 from pivoting.models.scene_changes import CHANGES, Edit
 from pivoting.models.shipped_files import BODY, TABLE, scene_path
 from pivoting.models.solver_settings import choose
@@ -31,7 +32,7 @@ class Scene:
         spec: what MuJoCo compiles.
         path: of the file.
         body, support: names of the body and of the geom that it stands on, '#id' of what the file leaves unnamed.
-        mass: of the body [kg], if it is changed.
+        values: that the body has once it is compiled, see `object_values`.
         scale: by which its size is changed.
         replaced: what of the file gave way to the settings of the shipped scenes, in words: what it was.
         unit: of the file's lengths [m], see `length_unit.length_unit`.
@@ -44,7 +45,7 @@ class Scene:
     path: Path
     body: str
     support: str
-    mass: float | None
+    values: Mapping[str, float]
     scale: float
     replaced: tuple[tuple[str, str], ...]
     unit: float
@@ -67,13 +68,17 @@ class Scene:
             model = _compiled(self.spec)[0]
         except ValueError as error:
             raise ModelError(f"model = {str(self.path)!r}: MuJoCo cannot compile it ({error})") from None
-        if self.mass is not None:  # of whatever the file derives it from: geoms, <inertial>, settotalmass
-            body = body_id(model, self.body)
-            share = self.mass / float(model.body_mass[body])
-            model.body_mass[body] *= share
-            model.body_inertia[body] *= share
-            mujoco.mj_setConst(model, mujoco.MjData(model))
+        if self.values:  # of whatever the file derives it from: geoms, <inertial>, settotalmass
+            self._set_values(model)
         return model
+
+    def _set_values(self, model: mujoco.MjModel) -> None:
+        body, axes = body_id(model, self.body), None
+        if any(name in self.values for name in COM):
+            free_the_com(model, body)
+            axes = in_plane_axes(read_body(model, self.body, self.support))
+        data = mujoco.MjData(model)
+        set_object_values(model, data, body, geom_id(model, self.support), self.values, axes, self.unit)
 
     def changed(self, changes: Mapping[str, float]) -> "Scene":
         """This scene with `changes`, whose keys are `WORLD_KEYS`; what each changes: `scene_changes`.
@@ -90,23 +95,13 @@ class Scene:
             if key not in CHANGES:
                 raise ModelError(f"{key} = {value!r}: of a scene only {', '.join(CHANGES)} can be changed")
         spec, wanted = self.spec.copy(), dict(changes)
-        edit = Edit(spec, self.body, self.unit, *self._parts(spec), self.mass, self.scale)
+        edit = Edit(spec, self.body, self.unit, *self._parts(spec), dict(self.values), self.scale)
         if self.replaced or ("dt" in wanted and self.path.parent == Path(__file__).parent):
             wanted.setdefault("timeconst", STIFF * wanted.get("dt", spec.option.timestep))
         for key, change in CHANGES.items():
             if key in wanted:
                 change(edit, wanted[key])
-        return replace(self, unchanged=False, spec=spec, mass=edit.mass, scale=edit.scale)
-
-    def with_contacts(self, settings: ContactSettings) -> "Scene":
-        """This scene with these contact parameters of the body and its support."""
-        spec = self.spec.copy()
-        solref = settings.timeconst, settings.dampratio
-        for part in self._parts(spec)[2]:
-            part.solref[:2], part.solimp[:2] = solref, settings.impedance
-        if spec.option.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
-            spec.option.o_solref[:2], spec.option.o_solimp[:2] = solref, settings.impedance
-        return replace(self, spec=spec, unchanged=False)
+        return replace(self, unchanged=False, spec=spec, values=edit.values, scale=edit.scale)
 
     def _parts(self, spec: mujoco.MjSpec) -> tuple[list[Any], Any, list[Any]]:
         """Of a spec of this scene: the body's geoms, the support, and all that has parameters of their contacts."""
@@ -165,7 +160,7 @@ def load(
         path,
         name,
         table.name,
-        None,
+        {},
         1.0,
         tuple(replaced.items()),
         length_unit(raw.opt.gravity),

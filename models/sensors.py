@@ -3,30 +3,34 @@
 from dataclasses import replace
 
 import mujoco
-from pivoting.models.frames import matrix, quaternion
+from pivoting.models.frames import Array, matrix, quaternion
 from pivoting.models.rigid_body import file_frame, read_body
 from pivoting.models.scenes import Scene
 
-SITE = "pivoting/object"  # object axes at the centre of mass
+SITE = "pivoting/object"  # object axes at what is taken for the centre of mass
 ON_PLANE, CONTACTS = 4, 8  # contacts of one geom with its support, at most: with a plane, with another geom
 SLOTS = 64  # contacts that are listed, at most
 
 
-def instrument(scene: Scene) -> tuple[mujoco.MjModel, dict[str, slice]]:
-    """Compile a scene with a site at the object's axes and CoM and the sensors that the loop reads.
+def instrument(scene: Scene, at: Array | None = None) -> tuple[mujoco.MjModel, dict[str, slice]]:
+    """Compile a scene with a site on the object, along its axes, and the sensors that the loop reads.
+
+    Args:
+        at: (3,) the point of the body where the site is, body frame [m]; by default the CoM.
 
     Returns:
-        The model, and where each reading is in sensordata: position (3) of the CoM, quaternion (4) object to
-        world, velocity (3) of the CoM and angular_velocity (3), world axes; contacts (S, 14): each contact with the
+        The model, and where each reading is in sensordata: position (3) of that point, quaternion (4) object to
+        world, velocity (3) of the point and angular_velocity (3), world axes; contacts (S, 14): each contact with the
         support, as `sim.contact_sensing` takes them apart; touching (4): number of contacts with anything, and their
         net force (3), world axes [N].
     """
     bare = scene.compiled
     body = read_body(bare, scene.body, scene.support)
     origin, axes = file_frame(bare, body.index)
+    point = body.com if at is None else at
     spec = scene.spec.copy()
     site = spec.body(scene.body).add_site(
-        name=SITE, pos=axes.T @ (body.com - origin), quat=quaternion(axes.T @ matrix(body.axes))
+        name=SITE, pos=axes.T @ (point - origin), quat=quaternion(axes.T @ matrix(body.axes))
     )
     del site
     at_site = {"objtype": mujoco.mjtObj.mjOBJ_SITE, "objname": SITE}

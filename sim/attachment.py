@@ -89,14 +89,24 @@ class Attached:
         known = drag_wrench(self.body, self.controller, self._orientation(data), *turning)[0]
         return solve(self.controller.problem(state, target, external=known))
 
-    def wrench(self, data: mujoco.MjData, reference: ArrayLike | Motion) -> Array:
+    def wrench(
+        self, data: mujoco.MjData, reference: ArrayLike | Motion, simulated: mujoco.MjModel | None = None
+    ) -> Array:
         """(6,) force [N] and torque [N m] at the CoM in world axes: assign it to `data.xfrc_applied[body]`.
 
-        Arguments and errors as for `solution`.
+        The wrench acts at the point of the body that the attached model has for its CoM. MuJoCo counts the torque about
+        the CoM of the model that it simulates, which is to be given if it is another.
+
+        Args:
+            data, reference: as for `solution`, and so are the errors.
+            simulated: the model that is stepped, with the same joints, whose object may be another.
         """
         answer = self.solution(data, reference)
         out = np.empty(6)
         world_wrench(self.controller.belief.source.map, self._orientation(data), answer.wrench, out)
+        if simulated is not None:
+            away = self.body.com - simulated.body_ipos[self.body.index]
+            out[3:] += np.cross(data.xmat[self.body.index].reshape(3, 3) @ away, out[:3])
         return out
 
 

@@ -6,14 +6,17 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from pivoting.controller.uncertainty.uncertainty import Uncertainty
 from pivoting.controller.validate import fail
 from pivoting.controller.wrench_controller import WrenchController
 from pivoting.models.friction_coefficient import read_friction
 from pivoting.models.names import body_id, geom_id
 from pivoting.models.scenes import Scene
 from pivoting.sim.attachment import Attached, attach
+from pivoting.sim.believed_set import believed_set, refuse_across_the_plane
 from pivoting.sim.pace import closing_force
 from pivoting.sim.placement import Placement, placed
+from pivoting.sim.scenarios.intervals import middle
 from pivoting.sim.scenarios.scenario import PACE, Scenario
 from pivoting.sim.scenarios.scenario_keys import CONTROL_KEYS, LOWEST
 from pivoting.sim.stances import Stance
@@ -26,12 +29,14 @@ class Believed(NamedTuple):
     """scene: as the controller knows it.  attached: the controller on it.  placement: of the object there.
 
     stances: one after another; the first controller of the first is that of `attached`.
+    uncertainty: the set about what it knows, in which it believes the world to be; None: it knows it exactly.
     """
 
     scene: Scene
     attached: Attached
     placement: Placement
     stances: tuple[Stance, ...]
+    uncertainty: Uncertainty | None = None
 
     @property
     def controllers(self) -> tuple[WrenchController, ...]:
@@ -62,6 +67,8 @@ def believe(case: Scenario, read: Scene, worlds: int = 1, given: Controllers = N
     scene = read.changed(case.believed)
     case = replace(case, body=scene.body, support=scene.support)
     there = placed(case, scene.compiled, read.unit)
+    refuse_across_the_plane(case, there.body)
+    believed = believed_set(case, there.body, read.unit)
     if case.chosen and case.mu is None:  # what the file itself says of friction holds: it may have none
         read_friction(read.read, body_id(read.read, read.body), geom_id(read.read, read.support), there.contacts)
     controllers = _given(given, worlds)
@@ -73,15 +80,14 @@ def believe(case: Scenario, read: Scene, worlds: int = 1, given: Controllers = N
         raise fail("gravity", 0.0, "> 0, or f_min > 0: without a load nothing presses the object on its support")
     K, L = len(there.contacts), len(there.landing)
     if controllers:
-        return Believed(
-            scene, Attached(scene.compiled, there.body, controllers[0]), there, (Stance.of(K * [True], controllers),)
-        )
+        attached = Attached(scene.compiled, there.body, controllers[0])
+        return Believed(scene, attached, there, (Stance.of(K * [True], controllers),), believed)
     own = partial(
         attach,
         scene.compiled,
         body=case.body,
         law=case.control_law(),
-        mu=case.mu,
+        mu=middle(case.mu),
         margin=case.margin,
         f_min=_floor(case.absolute(there.load), there) / read.unit,
         Q_w=case.wrench_weight(there.body.dim, read.unit),
@@ -89,12 +95,12 @@ def believe(case: Scenario, read: Scene, worlds: int = 1, given: Controllers = N
     )
     attached = own(contacts=list(there.contacts), radius=there.radius)
     if case.landing == "ignored":
-        return Believed(scene, attached, there, (Stance.of(K * [True], (attached.controller,)),))
+        return Believed(scene, attached, there, (Stance.of(K * [True], (attached.controller,)),), believed)
     if refused := _no_landing(case, scene.compiled, there):
         raise fail("landing", "held", f"ignored: {refused}")
     landed = own(contacts=[*there.contacts, *there.landing]).controller
     on_contact = Stance.of(K * [True] + L * [False], (attached.controller,))
-    return Believed(scene, attached, there, (on_contact, Stance.of((K + L) * [True], (landed,))))
+    return Believed(scene, attached, there, (on_contact, Stance.of((K + L) * [True], (landed,))), believed)
 
 
 def _no_landing(case: Scenario, model: mujoco.MjModel, there: Placement) -> str:

@@ -161,7 +161,7 @@ def sort_contacts(sensed, contacts, touching, pose, declared, rows, at, share, s
                         force[n, w, k, 2] += share[k] * c
                     if rows is not None and push > 0.0:
                         pulls = pull, side
-                        if add_row(rows, push, pulls, -apart, where, tangent, other, at, share, sums):
+                        if add_row(rows, w, push, pulls, -apart, where, tangent, other, at, share, sums):
                             for k in range(K):
                                 held[2][n, w, k] |= share[k] > 0.0
                 elif not landing:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.solution import STATUS
 from pivoting.models.length_unit import POWERS
-from pivoting.sim.run_arrays import CONTACT_AXES, WRENCH
+from pivoting.sim.run_arrays import CONTACT_AXES, WRENCH, own_values
 
 if TYPE_CHECKING:
     import pandas
@@ -23,7 +23,8 @@ def data_frame(run: "Run") -> "pandas.DataFrame":
     in the last row of a world. Columns: time_s; theta_rad, omega_rad_s, angle_error_rad and theta_desired_rad; x_m,
     vx_m_s, ... of the centre of mass, qw, ..., wx_rad_s, ... in world axes; clearance_m; slip_0_m of each contact; the
     applied wrench, wrench_Fu_N, ... in object axes; of each contact force_0_n_N, ... as predicted and
-    force_measured_0_n_N, ... in table axes, and friction_use_0; residual, status and control_us.
+    force_measured_0_n_N, ... in table axes, and friction_use_0; residual, status and control_us; what each
+    world has of its own, as world.KEY in the units of the keys.
 
     Raises:
         ModuleNotFoundError: pandas is not installed.
@@ -32,6 +33,7 @@ def data_frame(run: "Run") -> "pandas.DataFrame":
     states, steps = np.arange(run.time.size), run.time.size - 1
     index = pandas.MultiIndex.from_product([np.arange(run.worlds), states], names=["world", "step"])
     columns = {name: _column(values, run.worlds, states.size) for name, values in _columns(run).items()}
+    columns |= {name: np.repeat(values, states.size) for name, values in own_values(run).items()}
     frame = pandas.DataFrame(columns, index=index)
     codes = np.full((run.worlds, states.size), -1, dtype=np.int8)  # of what there is not
     codes[:, :steps] = run.status
@@ -42,7 +44,7 @@ def data_frame(run: "Run") -> "pandas.DataFrame":
 def fleet_frame(fleet: "Fleet") -> "pandas.DataFrame":
     """A row for each world of a fleet: its measures, in the units that the columns' names end with, and `passed`.
 
-    The index is world, from 0.
+    The index is world, from 0. What each has of its own comes first, as world.KEY in the units of the keys.
 
     Raises:
         ModuleNotFoundError: pandas is not installed.
@@ -50,7 +52,8 @@ def fleet_frame(fleet: "Fleet") -> "pandas.DataFrame":
     pandas = _pandas()
     passed = np.isin(np.arange(fleet.worlds), fleet.failed_worlds, invert=True)
     return pandas.DataFrame(
-        {**vars(fleet.measures), "passed": passed}, index=pandas.RangeIndex(fleet.worlds, name="world")
+        {**own_values(fleet), **vars(fleet.measures), "passed": passed},
+        index=pandas.RangeIndex(fleet.worlds, name="world"),
     )
 
 

@@ -125,13 +125,18 @@ class Experiment:
 
     @property
     def model(self) -> mujoco.MjModel:
-        """The world's, with the sensors of the loop."""
+        """The world's, with the sensors of the loop; where the worlds differ as of `truth`."""
         return self.world.model
 
     @property
     def truth(self) -> RigidBody:
-        """The object as the world has it."""
+        """The object as the world has it; where the worlds differ as in the middle of them, see `World.of`."""
         return self.world.truth
+
+    def values_of(self, world: int) -> dict[str, float]:
+        """What one world has of its own, as overrides of its scenario, by "world.KEY"; nothing where they are alike."""
+        values = self.world.values
+        return {} if values is None else {f"world.{key}": value for key, value in values.of(world).items()}
 
     @property
     def unit(self) -> float:
@@ -145,7 +150,7 @@ class Experiment:
 
     @property
     def points(self) -> Array:
-        """(K, 3) the contact points, or centres of what rolls, from the CoM, object axes [m]."""
+        """(K, 3) the contact points, or centres of what rolls, from what is taken for the CoM, object axes [m]."""
         return self.world.declared.points
 
     @property

@@ -14,7 +14,17 @@ from pivoting.sim.fleet import Fleet, Handed, WorldSamples
 from pivoting.sim.judging.findings import Findings
 from pivoting.sim.judging.measures import Measures
 from pivoting.sim.netcdf import Variable
-from pivoting.sim.run_arrays import WRENCH, Arrays, Meaning, meaning_of, outcome_of, outcome_words, variable
+from pivoting.sim.run_arrays import (
+    WRENCH,
+    Arrays,
+    Meaning,
+    meaning_of,
+    outcome_of,
+    outcome_words,
+    own_values,
+    own_variable,
+    variable,
+)
 from pivoting.sim.run_setup import Begun
 
 _MEASURES = {  # what they are; dimension and unit follow from the name
@@ -42,6 +52,7 @@ _OTHERS: dict[str, Meaning] = {
 def fleet_described(fleet: Fleet) -> dict[str, Variable]:
     """All arrays of a fleet's file, by name, with dimensions, units and meanings."""
     found = {"world": variable("world", np.arange(fleet.worlds))}
+    found |= {name: own_variable(name, values) for name, values in own_values(fleet).items()}
     for name, values in vars(fleet.measures).items():
         unit = next((unit for unit in ("m", "deg", "s") if name.endswith(f"_{unit}")), "")
         found[name] = variable(name, values, meaning=("world", unit, _MEASURES[name]))

@@ -23,6 +23,7 @@ from pivoting.sim.netcdf import Variable
 from pivoting.sim.pipeline.log import Log, worlds_first
 from pivoting.sim.pipeline.plan_log import Event, PlanLog
 from pivoting.sim.pipeline.stages import ANGULAR_VELOCITY, ORIENTATION, POSITION, VELOCITY, Answers
+from pivoting.sim.scenarios.scenario_keys import KEYS
 
 if TYPE_CHECKING:
     from pivoting.sim.experiment import Experiment
@@ -49,9 +50,9 @@ _MEANINGS = {  # name: dimensions, unit, what it is
         "m",
         "displacement of contacts along the table since they are to hold",
     ),
-    "position": ("world state xyz", "m", "centre of mass, world axes"),
+    "position": ("world state xyz", "m", "what is taken for the centre of mass, world axes"),
     "quaternion": ("world state wxyz", "", "orientation, object axes to world"),
-    "velocity": ("world state xyz", "m/s", "velocity of the centre of mass, world axes"),
+    "velocity": ("world state xyz", "m/s", "velocity of what is taken for the centre of mass, world axes"),
     "angular_velocity": ("world state xyz", "rad/s", "angular velocity, world axes"),
     "required": ("world step component", "N, N m", "what contacts and wrench have to make together, object axes"),
     "wrench": ("world step component", "N, N m", "wrench that was asked for, object axes"),
@@ -60,7 +61,11 @@ _MEANINGS = {  # name: dimensions, unit, what it is
     "status": ("world step", "", "status of the answer"),
     "stance": ("world step", "", "number of the stance, the set of contacts that are to hold"),
     "acting": ("world step component", "N, N m", "wrench that acted, object axes"),
-    "wrench_world": ("world step wrench_axis", "N, N m", "applied force and torque at the centre of mass, world axes"),
+    "wrench_world": (
+        "world step wrench_axis",
+        "N, N m",
+        "applied force and torque at the true centre of mass",
+    ),
     "contact_force": ("world step contact xyz", "N", "contact forces on the object by MuJoCo, world axes"),
     "contact_found": ("world step", "", "contacts between the object and its support"),
     "contact_stray": ("world step", "N", "force of contacts that are not declared"),
@@ -110,7 +115,7 @@ def named_arrays(run: "Run") -> dict[str, Array]:
     found |= {"force": run.force, "acting": log.acting, "wrench_world": log.wrench_world}
     found |= _of_fields("contact_", log.contacts) | _of_fields("held_", log.held) | {"control_ns": log.control_ns}
     found |= dict(zip(("start_qpos", "start_qvel"), run.start, strict=True))
-    found |= {"stance": run.stance}
+    found |= {"stance": run.stance} | own_values(run)
     if run.plans is not None:
         found |= _of_fields("plans_", run.plans)
     if run.plan is not None:
@@ -125,7 +130,20 @@ def described(run: "Run") -> dict[str, Variable]:
     dim, arrays = run.truth.dim, named_arrays(run)
     arrays |= {name: np.array(names) for name, names in _NAMES.items()}
     arrays |= {"component": np.array(WRENCH[dim]), "contact_axis": np.array(CONTACT_AXES[dim])}
-    return {name: variable(name, values, run.unit) for name, values in arrays.items()}
+    own = {name: own_variable(name, arrays.pop(name)) for name in own_values(run)}
+    return {name: variable(name, values, run.unit) for name, values in arrays.items()} | own
+
+
+def own_values(run: "Experiment") -> dict[str, Array]:
+    """What each world has of its own, (W,) by "world.KEY"; nothing where they are alike."""
+    values = run.world.values
+    return {} if values is None else {f"world.{key}": column for key, column in values.columns.items()}
+
+
+def own_variable(name: str, values: Array) -> Variable:
+    """One of them as a file has it."""
+    key = KEYS[name.removeprefix("world.")]
+    return variable(name, values, meaning=("world", key.unit, key.help))
 
 
 def meaning_of(name: str) -> Meaning:

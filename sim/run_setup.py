@@ -10,13 +10,16 @@ from pivoting.controller.references import Reference
 from pivoting.controller.validate import fail, frozen
 from pivoting.controller.wrench_bounds import WrenchBounds
 from pivoting.models.frames import matrix
+from pivoting.models.object_values import check_friction
 from pivoting.models.scenes import load
 from pivoting.sim.belief import Believed, Controllers, believe
 from pivoting.sim.pipeline.stages import Setting
 from pivoting.sim.placement import Placement
+from pivoting.sim.scenarios.object_keys import COM_KEYS
 from pivoting.sim.scenarios.scenario import Scenario
 from pivoting.sim.start_states import Samples
 from pivoting.sim.world import World, build_world
+from pivoting.sim.world_values import WorldValues, drawn_values, vertex_values
 
 Array = NDArray[np.float64]
 MOST = 10**15  # worlds, and their numbers: more than can be run
@@ -70,7 +73,7 @@ class Begun(NamedTuple):
         """The same for some of the worlds, from that with the index `first` on."""
         setting = self.setting
         some = setting._replace(worlds=worlds, first_world=setting.first_world + first)
-        return self._replace(setting=some, belief=self.belief.part(first, worlds))
+        return self._replace(setting=some, belief=self.belief.part(first, worlds), world=self.world.part(first, worlds))
 
 
 def set_up(
@@ -90,12 +93,29 @@ def set_up(
     scene = load(asked.path, body=asked.body, support=asked.support, chosen=asked.chosen)
     belief = believe(asked, scene, int(worlds), controller)
     case = asked.absolute(belief.placement.load)
-    world = build_world(case, belief.scene, scene, belief.placement)
+    values = _values(case, belief, int(seed), int(worlds), int(first_world))
+    world = build_world(case, belief.scene, scene, belief.placement, values)
+    world = world.of(0) if worlds == 1 else world
     turning = -matrix(belief.placement.body.table)[:, 1:2].T if belief.placement.body.dim == 2 else np.eye(3)
     counts = int(seed), int(worlds), int(first_world)
     setting = Setting(*counts, world.dt, turning, belief.attached.controller.law)
     timed = _timed(case, belief, world)
     return Begun(asked, case, belief, world, *timed, setting)
+
+
+def _values(case: Scenario, belief: Believed, seed: int, worlds: int, first: int) -> WorldValues | None:
+    """What each world has of its own; None where they are alike."""
+    if case.differing is None:
+        return None
+    across = COM_KEYS[1] if belief.placement.body.dim == 2 else ""  # the plane, where it does nothing
+    sets = {key: interval for key, interval in case.differing.items() if key != across}
+    if not sets:
+        return None
+    if "mu" in sets:
+        check_friction(sets["mu"].low)
+    if case.worlds_at == "vertices":
+        return vertex_values(sets, worlds, first)
+    return drawn_values(sets, seed, worlds, first)
 
 
 def on_reference(begun: Begun, reference: Reference, seconds: float) -> Begun:

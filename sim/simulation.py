@@ -34,6 +34,7 @@ from pivoting.sim.scenario_control import Decided, decide, laws_of, stages_of
 from pivoting.sim.scenarios.scenario import Scenario
 from pivoting.sim.scenarios.shipped_scenarios import scenario
 from pivoting.sim.start_states import resting_depths, start_worlds
+from pivoting.sim.world import World
 
 Array = NDArray[np.float64]
 LANE = 64  # worlds that are worth a thread
@@ -139,7 +140,7 @@ def run_worlds(
         own = decided if len(bounds) == 1 else _decided(part, handed, open_loop)
         batch = start_batch(part, own, threads=1 if len(bounds) > 1 else 0)
         starts.append(start_of(batch))
-        apply = FreeWrench(batch, begun.belief.attached.controller.belief.source.map, begun.world.truth.index)
+        apply = free_wrench(part, batch)
         plant = Plant(batch, begun.world.sensors)
         lanes.append(steps_of(part, own, plant, apply, some_worlds(log, first, last)))
     with hearing as warned:
@@ -167,11 +168,27 @@ def _lanes(worlds: int) -> list[tuple[int, int]]:
     return list(pairwise(worlds * part // parts for part in range(parts + 1)))
 
 
+def new_batch(world: World, worlds: int, threads: int = 1) -> Batch:
+    """So many worlds, each with what it has of its own; `threads` as of `start_batch`."""
+    differing = world.differing
+    model = world.model if differing is None else differing.bare
+    batch = Batch(model, worlds, nthread=1 if worlds == 1 else threads, persistent=True)
+    if differing is not None:
+        differing.fill(batch)
+    return batch
+
+
+def free_wrench(begun: Begun, batch: Batch) -> FreeWrench:
+    """What applies the wrench to these worlds."""
+    source, world = begun.belief.attached.controller.belief.source, begun.world
+    return FreeWrench(batch, source.map, world.truth.index, world.offsets)
+
+
 def start_batch(begun: Begun, decided: Decided, threads: int = 1) -> Batch:
     """The worlds where they start; `threads`: that MuJoCo steps them with, 0 for as many as there are processors."""
     world, controllers = begun.world, begun.belief.controllers
     seed, worlds, first = begun.setting[:3]
-    batch = Batch(world.model, worlds, nthread=1 if worlds == 1 else threads, persistent=True)
+    batch = new_batch(world, worlds, threads)
     draws = np.random.Generator(np.random.PCG64(seed).advance(first))  # a number for each world
     errors = draws.uniform(-1.0, 1.0, worlds)
     depths = resting_depths(world, controllers, decided.per_step, begun.told) if begun.case.chosen else np.zeros(1)
@@ -196,9 +213,8 @@ def steps_of(begun: Begun, decided: Decided, plant: Plant, apply: FreeWrench, lo
     """The steps that a run is to make, from the states that the plant has, written to the log of its worlds."""
     world = begun.world
     table = matrix(world.truth.table)
-    contacts = ContactLog(
-        world.declared, world.contact_rows, table, world.sensors, plant.worlds, log.contacts, log.held
-    )  # fmt: skip
+    rows = [each.rows for each in world.truths]
+    contacts = ContactLog(world.declared, rows, table, world.sensors, plant.worlds, log.contacts, log.held)
     return Steps(plant, decided.stages, decided.control, apply, contacts, log)
 
 

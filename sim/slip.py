@@ -22,18 +22,18 @@ class ContactMotion(Trajectory):
 
     @cached_property
     def turning(self) -> Array:
-        """(W, N+1, K, 3) from the CoM to the material contact points, or the centres of what rolls, table axes [m]."""
+        """(W, N+1, K, 3) from `position` to the material contact points, or centres of what rolls, table axes [m]."""
         return frozen(self.from_com(self.points))
 
     @cached_property
     def lever(self) -> Array:
-        """(W, N+1, K, 3) from the CoM to where the contacts touch, table axes [m]."""
+        """(W, N+1, K, 3) from `position` to where the contacts touch, table axes [m]."""
         return frozen(self.turning - self._up)
 
     @cached_property
     def stepped(self) -> Array:
-        """(W, N+1, 3) from the CoM to the point of the body whose velocity MuJoCo steps, table axes [m]."""
-        point = stepped_point(self.model, self.truth.index) - self.truth.com
+        """(W, N+1, 3) from `position` to the point of the body whose velocity MuJoCo steps, table axes [m]."""
+        point = stepped_point(self.model, self.truth.index) - self.world.applied_at
         return frozen(self.from_com(point[None] @ matrix(self.truth.axes))[..., 0, :])
 
     @cached_property
@@ -69,7 +69,7 @@ class ContactMotion(Trajectory):
 
     @property
     def _com(self) -> Array:
-        """(W, N+1, 3) the CoM from the table's origin, table axes."""
+        """(W, N+1, 3) `position` from the table's origin, table axes."""
         return (self.position - self.truth.origin) @ self.table_axes
 
     @cached_property
@@ -97,7 +97,8 @@ class ContactMotion(Trajectory):
         tangential = np.linalg.norm(self.force_measured[..., :-1], axis=-1)
         normal = self.force_measured[..., -1]
         pushed = (normal > 0.0) & self.standing
-        return frozen(np.where(pushed, tangential, np.nan) / np.where(pushed, self.world.mu * normal, 1.0))
+        mu = np.array([each.mu for each in self.world.truths])[:, None, None]
+        return frozen(np.where(pushed, tangential, np.nan) / np.where(pushed, mu * normal, 1.0))
 
     @cached_property
     def landed(self) -> NDArray[np.bool_]:

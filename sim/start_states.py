@@ -1,6 +1,7 @@
 """How the worlds start: the object on its contact, as deep in it as its load makes it, a little off the reference."""
 
 from collections.abc import Sequence
+from itertools import repeat
 
 import mujoco
 import numpy as np
@@ -25,7 +26,7 @@ DEEPEST = 1e-2  # likewise: how deep it may start
 def resting_depths(world: World, controllers: Sequence[WrenchController], law: LawControl, told: Samples) -> Array:
     """(B,) how deep [m] the contacts are under the load with which the law of each of B controllers begins.
 
-    0 if MuJoCo's rows do not say.
+    Of W worlds that differ (W,). 0 if MuJoCo's rows do not say.
     """
     B = len(controllers)
     if world.contact_rows is None:
@@ -36,7 +37,7 @@ def resting_depths(world: World, controllers: Sequence[WrenchController], law: L
     with first_calls():
         law.prepare(states, out)
     load = out.force.reshape(B, -1, controllers[0].space.dim)[..., -1].sum(axis=1)
-    return world.contact_rows.depth(load / world.contact_rows.points)
+    return world.depths(np.broadcast_to(load, len(world.truths)) if B == 1 else load)
 
 
 def start_worlds(batch: Batch, world: World, desired: Samples, errors: Array, depths: Array) -> None:
@@ -52,14 +53,15 @@ def start_worlds(batch: Batch, world: World, desired: Samples, errors: Array, de
     Raises:
         ModelError: the object would touch something else there; it is named.
     """
-    model, there, body = world.model, world.placement, world.truth
-    data, up, point = initial_data(model), matrix(body.table)[:, 2], there.contacts[0]
+    there, body, W = world.placement, world.truth, len(errors)
+    models = repeat(world.model, W) if world.differing is None else world.differing.models()
+    data, up, point = initial_data(world.model), matrix(body.table)[:, 2], there.contacts[0]
     known = np.where(depths > 0.0, depths, START_DEPTH * there.lever)
-    each = np.broadcast_to(np.minimum(known, DEEPEST * there.lever), len(errors))
+    each = np.broadcast_to(np.minimum(known, DEEPEST * there.lever), W)
     kind, floats = int(mujoco.mjtState.mjSTATE_INTEGRATION), 0.0
-    state, begun = (np.empty(mujoco.mj_stateSize(model, kind)) for _ in range(2))
-    mujoco.mj_getState(model, data, begun, kind)
-    for row, error, depth in zip(batch.state, errors, each, strict=True):
+    state, begun = (np.empty(mujoco.mj_stateSize(world.model, kind)) for _ in range(2))
+    mujoco.mj_getState(world.model, data, begun, kind)
+    for row, error, depth, model in zip(batch.state, errors, each, models, strict=True):
         mujoco.mj_setState(model, data, begun, kind)  # whatever other worlds there are, to the last bit
         for _ in range(2):  # a contact with a margin holds the body above the table: how far, only MuJoCo knows
             at = there.at + (there.radius[0] + floats - depth) * up

@@ -47,7 +47,7 @@ class Trajectory(Experiment):
 
     @property
     def position(self) -> Array:
-        """(W, N+1, 3) centre of mass, world axes [m]."""
+        """(W, N+1, 3) the point that the controller takes for the centre of mass, world axes [m]."""
         return self.log.states[..., POSITION]
 
     @property
@@ -57,7 +57,7 @@ class Trajectory(Experiment):
 
     @property
     def velocity(self) -> Array:
-        """(W, N+1, 3) of the centre of mass, world axes [m/s]."""
+        """(W, N+1, 3) of that point, world axes [m/s]."""
         return self.log.states[..., VELOCITY]
 
     @property
@@ -72,13 +72,13 @@ class Trajectory(Experiment):
 
     @property
     def wrench(self) -> Array:
-        """(W, N, 3 or 6) that was asked for, object axes, (F_u, F_v, M) in the plane [N, N m]; nan where there was no
-        answer, and then none is applied."""
+        """(W, N, 3 or 6) that was asked for, object axes, (F_u, F_v, M) in the plane [N, N m], at the point that
+        `position` is of; nan where there was no answer, and then none is applied."""
         return self.log.answers.wrench
 
     @property
     def wrench_world(self) -> Array:
-        """(W, N, 6) applied force and torque at the centre of mass, world axes."""
+        """(W, N, 6) applied force and torque at the true centre of mass, world axes, as MuJoCo takes them."""
         return self.log.wrench_world
 
     @property

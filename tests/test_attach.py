@@ -207,3 +207,25 @@ def test_data_of_another_model_is_refused() -> None:
 def test_not_a_model() -> None:
     with pytest.raises(ValueError, match=r"model = 'file.xml'"):
         attach("file.xml", body="b", contacts=[(0.0, 0.0)])  # type: ignore[arg-type]
+
+
+def test_the_wrench_acts_where_the_attached_model_has_its_centre_of_mass() -> None:
+    """In a model that is simulated in its place, whose own is elsewhere, its moment counts about that."""
+    believed, true = (mujoco.MjModel.from_xml_string(STRANGER) for _ in range(2))
+    body = believed.body("bracket").id
+    true.body_ipos[body] += [0.03, -0.02, 0.01]
+    data = mujoco.MjData(true)
+    data.qpos[-1] = 0.4
+    controller = attach(believed, body="bracket", contacts=[(-0.1, -0.02, 0.0)])
+    plain, moved = controller.wrench(data, 0.4), controller.wrench(data, 0.4, simulated=true)
+    np.testing.assert_array_equal(controller.wrench(data, 0.4, simulated=believed), plain)
+    points = [data.xpos[body] + data.xmat[body].reshape(3, 3) @ each.body_ipos[body] for each in (believed, true)]
+    generalised = []
+    for wrench, point in zip((plain, moved), points, strict=True):
+        acts = np.zeros(true.nv)
+        mujoco.mj_kinematics(true, data)
+        mujoco.mj_comPos(true, data)
+        mujoco.mj_applyFT(true, data, wrench[:3], wrench[3:], point, body, acts)
+        generalised.append(acts)
+    np.testing.assert_allclose(*generalised, atol=1e-14)
+    assert np.abs(plain - moved).max() > 1e-3

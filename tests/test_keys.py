@@ -34,9 +34,10 @@ def test_every_value_of_a_scenario_is_declared_once() -> None:
 
 
 def test_what_changes_a_scene_is_what_models_can_change() -> None:
-    """Each key of the object and the simulator, and nothing else, is a change of the scene."""
+    """Each key of the object and the simulator, but com, which stands for three of them, is a change of the scene."""
     assert set(SCENE_KEYS) == set(WORLD_KEYS)
-    assert {key for key in KEYS if KEYS[key].group in (KEYS["mu"].group, KEYS["dt"].group)} == set(WORLD_KEYS)
+    changing = {key for key in KEYS if KEYS[key].group in (KEYS["mu"].group, KEYS["dt"].group)}
+    assert changing - {"com"} == set(WORLD_KEYS)
     with pytest.raises(ModelError, match=r"^theta = 3.0: of a scene only dt, impratio, .* can be changed"):
         load(scene_path("pivot-2d"), {"theta": 3.0})
 
@@ -58,7 +59,7 @@ def test_text_is_read() -> None:
     assert KEYS["plan_steps"].read("plan_steps", "7") == 7
     assert isinstance(KEYS["plan_steps"].read("plan_steps", "7"), int)
     assert KEYS["law"].read("law", "static") == "static"
-    with pytest.raises(ValueError, match=r"^world.mu = 'x': must be a number$"):
+    with pytest.raises(ValueError, match=r"^world.mu = 'x': must be a number, or an interval LOW:HIGH$"):
         KEYS["mu"].read("world.mu", "x")
     assert type(Limits().change({"contacts_end": "4"}).contacts_end) is int
     with pytest.raises(ValueError, match=r"^limits.contacts_end = 1.5: must be a whole number"):
@@ -68,7 +69,7 @@ def test_text_is_read() -> None:
 def test_help_has_every_key_with_what_it_may_be() -> None:
     rows = {name: text for _, section in key_help() for name, text in section}
     assert set(rows) == {*KEYS, *declared_keys(Limits)}
-    assert "> 0 and <= 10; default: as the scene has it" in rows["mu"]
+    assert "> 0 and <= 10, or LOW:HIGH; default: as the scene has it" in rows["mu"]
     assert "> 0 N, or 2w; default: none" in rows["force_max"]
     assert "static, quasi-dynamic, quasi-dynamic-velocity, dynamic; default: dynamic" in rows["law"]
     assert "[>= 0 and < 45 deg; default: 5; only if reference is sine]" in rows["amplitude"]
@@ -215,7 +216,8 @@ def test_what_was_set_is_kept_in_the_changes() -> None:
     assert case.change(theta=30).change(**{"world.mu": 0.4}).changes == {"theta": 30, "world.mu": 0.4}
     assert case.change(limits={"slip_m": "2e-5"}).changes == {"limit.slip_m": 2e-5}
     assert case.change(**{"world.mu": 0.2}).change(mu=0.25).changes == {"mu": 0.25}
-    assert set(HIDDEN_KEYS) == {"mu", "mass", "size", "incline", "gravity"}
+    own = {"mu", "mass", "inertia", "com", "com_x", "com_y", "com_z", "size", "incline", "gravity"}
+    assert set(HIDDEN_KEYS) == own
     assert set(CONTROL_KEYS) == {"law", "bandwidth", "damping", "margin", "f_min", "length"}
 
 

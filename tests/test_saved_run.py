@@ -130,7 +130,8 @@ def test_xarray_opens_it(kept: tuple[Run, Path]) -> None:
             np.testing.assert_array_equal(data[name].values, getattr(run, name))
         assert data["held_slides"].dtype == bool
         assert data["status"].attrs["flag_meanings"].split()[3] == "bounded"
-        assert data["velocity"].attrs == {"long_name": "velocity of the centre of mass, world axes", "units": "m/s"}
+        of = "velocity of what is taken for the centre of mass, world axes"
+        assert data["velocity"].attrs == {"long_name": of, "units": "m/s"}
         for name, variable in data.data_vars.items():
             assert variable.attrs["long_name"], name
             assert ("units" in variable.attrs) == (name not in UNITLESS), name

@@ -117,6 +117,8 @@ def run(out: str | None, record_world: int | None, as_json: JsonOutput | None, *
 
     The scenario pivot takes an object of your own: --model FILE.xml --body NAME --contact vertex.
 
+    LOW:HIGH is an interval: the controller knows no more, and each world has a value of its own.
+
     Below, each key with what it may be and its default, unless the scenario has another. 2w is twice the object's
     weight as it is believed (of a moment at the lever from contact to centre of mass, of a rate per second), 2T twice
     its natural time, sqrt(lever / gravity).

@@ -93,7 +93,12 @@ def _print_verdict(console: Console, run: Experiment, summary: Mapping[str, Any]
     if run.worlds > 1:
         more = f" and {failed - _FAILED} more" * (failed > _FAILED)
         some = ", ".join(str(i) for i in run.failed_worlds[:_FAILED]) + more
-        line = f"the worst world is {run.worst_world}" + f"; those that fail are {some}" * bool(failed)
+        own = ", ".join(f"{key}={value:.4g}" for key, value in summary.get("worst_world_values", {}).items())
+        line = (
+            f"the worst world is {run.worst_world}"
+            + f" ({own})" * bool(own)
+            + f"; those that fail are {some}" * bool(failed)
+        )
         console.print(line, highlight=False)
 
 

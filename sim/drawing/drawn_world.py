@@ -11,6 +11,7 @@ from pivoting.controller.solution_space import SolutionSpace, solution_space
 from pivoting.models.support_surfaces import upward
 from pivoting.sim.drawing.shapes import Solid, arcs, body_solids, cone
 from pivoting.sim.run import Run
+from pivoting.sim.world import World
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -55,7 +56,12 @@ class DrawnWorld:
     @property
     def model(self) -> mujoco.MjModel:
         """The world's, which may differ from what the controller believes."""
-        return self.run.model
+        return self.truth.model
+
+    @cached_property
+    def truth(self) -> World:
+        """The world as it is alone."""
+        return self.run.world.of(self.world)
 
     @cached_property
     def solids(self) -> list[Solid]:
@@ -143,7 +149,7 @@ class DrawnWorld:
     @property
     def weight(self) -> Array:
         """(3,) m g, world axes [N]."""
-        return self.run.truth.mass * self.run.truth.gravity
+        return self.truth.truth.mass * self.run.truth.gravity
 
     @property
     def planned_mu(self) -> Array:
@@ -240,7 +246,7 @@ class DrawnWorld:
 
     def cone(self, i: int, *, planned: bool) -> tuple[Array, NDArray[np.int64], list[Array]]:
         """The friction cone of contact i, planned or the world's, in table axes [m]; see `shapes.cone`."""
-        mu = float(self.planned_mu[i]) if planned else self.run.world.mu
+        mu = float(self.planned_mu[i]) if planned else self.truth.mu
         floor = self.scale * self.run.controller_of(self.world, -1).contacts[i].f_min
         tall = 0.8 if self.dim == 2 else 0.45
         return cone(mu, floor * planned, max(tall * self.side / np.hypot(mu, 1.0), 1.3 * floor), self.dim)

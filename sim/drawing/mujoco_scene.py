@@ -60,7 +60,7 @@ class MujocoScene:
     def show(self, row: int) -> mujoco.MjvScene:
         """The scene at the beginning of step `row`."""
         film, run, scene, i = self._film, self._film.run, self.scene, self._film.world
-        place(self.model, self._data, run.truth, run.quaternion[i, row], run.truth.com, run.position[i, row])
+        place(self.model, self._data, run.truth, run.quaternion[i, row], run.world.applied_at, run.position[i, row])
         mujoco.mjv_updateScene(self.model, self._data, self._option, None, mujoco.MjvCamera(), EVERY, scene)
         for geom in scene.geoms[: scene.ngeom]:
             if geom.objtype == GEOM and self.model.geom_bodyid[geom.objid] == run.truth.index:

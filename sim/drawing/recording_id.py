@@ -17,6 +17,7 @@ def digest(run: "Experiment") -> str:
     beliefs = tuple(controller.belief for stance in run.stances for controller in stance.controllers)
     given = (model, run.points, run.world.radius, run.world.turn, run.reference, beliefs)
     case = run.scenario.absolute(run.load)
+    own = () if run.world.values is None else tuple(run.world.values)
     words = (
         case.bounds(),
         case.limits,
@@ -28,7 +29,7 @@ def digest(run: "Experiment") -> str:
         case.stages,
     )
     out = hashlib.blake2b(digest_size=6)
-    _add(out, (*given, repr(words), run.controller, run.open_loop))
+    _add(out, (*given, *own, repr(words), run.controller, run.open_loop))
     return out.hexdigest()
 
 

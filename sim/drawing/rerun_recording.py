@@ -288,7 +288,7 @@ def _series(film: Film) -> dict[str, tuple[Colour, float, Array]]:
         out[f"wrench/{name}"] = (colour, FINE, values)
     for k, tag in enumerate(film.tags):
         tail, fade = f"_{tag}" * bool(tag), 1.0 - 0.7 * k / len(film.tags)
-        planned = np.full(N, film.planned_mu[k] / run.world.mu)
+        planned = np.full(N, film.planned_mu[k] / film.truth.mu)
         for name, colour, width, values in (
             ("slip/measured", RED, WIDE, along(slips[0][:, k])),
             ("slip/predicted", WHITE, FINE, along(slips[1][:, k])),

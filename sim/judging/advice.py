@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from pivoting.sim.run import Run
     from pivoting.sim.scenarios.scenario import Scenario
+    from pivoting.sim.world import World
 
 Array = NDArray[np.float64]
 SLIDES = 0.999  # of mu f_n: at more a contact slides
@@ -49,6 +51,11 @@ class _Case:
         """Its index."""
         return self.run.worst_world
 
+    @cached_property
+    def truth(self) -> "World":
+        """As it is alone."""
+        return self.run.world.of(self.world)
+
     def failed(self, name: str) -> bool:
         """Whether it is over the limit of the check of that name."""
         return any(check.name == name and bool(check.failed[self.world]) for check in self.run.checks)
@@ -77,7 +84,7 @@ class _Case:
     @property
     def friction_found(self) -> float:
         """Greatest |f_t| / f_n of a contact that pushes."""
-        return float(np.nanmax(self.run.friction_use[self.world], initial=0.0)) * self.run.world.mu
+        return float(np.nanmax(self.run.friction_use[self.world], initial=0.0)) * self.truth.mu
 
     @property
     def least_push(self) -> float:
@@ -124,7 +131,7 @@ def _reasons(case: _Case, strays: list[str]) -> Iterator[str]:
     if case.slid is not None and (case.failed("slip_max_m") or case.failed("friction_use_max")):
         k = case.slid
         at = f"at {run.time[k]:.3g} s ({theta[k]:.3g} deg)"
-        yield f"the contact slid {at}: |f_t| reached mu f_n, mu = {run.world.mu:.3g}"
+        yield f"the contact slid {at}: |f_t| reached mu f_n, mu = {case.truth.mu:.3g}"
     elif case.failed("slip_max_m"):
         floor, slip = float(run.measures.slip_floor_m[i]), float(run.measures.slip_max_m[i])
         part = "unpredicted"
@@ -164,7 +171,7 @@ def _remedies(case: _Case) -> Iterator[Remedy]:
     if case.diverged is not None or scenario.bandwidth * run.dt > QUICK:
         slower = min(_up(0.5 * QUICK / run.dt), 0.5 * scenario.bandwidth)
         yield Remedy({"bandwidth": slower}, "a slower law")
-    softer = Remedy({"timeconst": 3.0 * float(run.model.geom_solref[run.truth.support, 0])}, "a softer contact")
+    softer = Remedy({"timeconst": 3.0 * float(case.truth.model.geom_solref[run.truth.support, 0])}, "a softer contact")
     if case.diverged is not None:
         yield from (Remedy({"dt": run.dt / 4.0}, "a finer time step"), softer)
         return
@@ -206,9 +213,9 @@ def _floors(case: _Case) -> Iterator[float]:
     K, belief = int(np.count_nonzero(run.stances[0].held)), run.controller_of(i).belief
     off = np.linalg.norm(run.force_measured[i] - run.force[i], axis=-1)
     error = run.unit * float(np.quantile(np.nan_to_num(off), 0.95))
-    spare = max(run.world.mu - float(np.max(belief.contacts.mu)), 0.1 * run.world.mu)
+    spare = max(case.truth.mu - float(np.max(belief.contacts.mu)), 0.1 * case.truth.mu)
     some = {0.5 * case.weight / K, 2.0 * case.weight / K, 5.0 * case.weight / K}
-    rows = run.world.contact_rows
+    rows = case.truth.contact_rows
     most = 20.0 * case.weight
     if rows is not None:
         w = run.angular_velocity[i] @ run.table_axes
@@ -216,7 +223,7 @@ def _floors(case: _Case) -> Iterator[float]:
         c_n = float(np.nanmax(np.abs(np.cross(w[:, None], np.cross(w[:, None], arm))[..., 2]), initial=0.0))
         opening = c_n * max(1.0 - 0.5 * rows.b * rows.h, 0.0) / rows.regularisation * rows.points / K
         some |= {2.0 * run.unit * opening}
-    some |= {1.5 * error * (1.0 + run.world.mu) / spare}
+    some |= {1.5 * error * (1.0 + case.truth.mu) / spare}
     least = max(1.2 * run.unit * float(belief.contacts.f_min.min()), 0.05 * case.weight / K)
     yield from sorted({_up(floor) for floor in some if least < floor < most})
 
@@ -234,7 +241,7 @@ def _slower(case: _Case) -> Iterator[Remedy]:
 
 def _contact(case: _Case) -> Iterator[Remedy]:
     """Contact parameters under which the simulator itself slips less and holds on; see docs/fidelity.md."""
-    run, rows = case.run, case.run.world.contact_rows
+    run, rows = case.run, case.truth.contact_rows
     if rows is None or not (case.failed("slip_max_m") or case.failed("contact_lost_s")):
         return
     if abs(rows.b * rows.h - 1.9) > 0.01 or run.model.opt.impratio < SHIPPED["impratio"]:

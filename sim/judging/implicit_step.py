@@ -29,14 +29,17 @@ def unseen(run: "ContactMotion") -> Array | None:
     if not (gyroscopic or damped):
         return None
     to_world, to_object = run.quaternion, run.quaternion * CONJUGATE
-    com = rotated(to_object, -run.stepped @ run.table_axes.T)[:, :-1]  # from the point that is stepped; object axes
+    truths = run.world.truths
+    offset, mass = np.array([each.offset for each in truths])[:, None], np.array([each.mass for each in truths])
+    # from the point that is stepped; object axes
+    com = rotated(to_object, -run.stepped @ run.table_axes.T)[:, :-1] - offset
     omega = rotated(to_object, run.angular_velocity)
     dv = np.diff(run.stepped_velocity @ run.table_axes.T, axis=1)
     w, dw = omega[:, :-1], np.diff(omega, axis=1)
-    inertia = run.attached.controller.space.lift_inertia(body.inertia)
+    inertia = np.array([each.inertia for each in truths])
     force, moment = np.zeros_like(dw), np.zeros_like(dw)
     if gyroscopic:
-        force -= body.mass * (np.cross(dw, np.cross(w, com)) + np.cross(w, np.cross(dw, com)))
+        force -= mass[:, None, None] * (np.cross(dw, np.cross(w, com)) + np.cross(w, np.cross(dw, com)))
         moment -= np.cross(dw, w @ inertia) + np.cross(w, dw @ inertia)
     if damped:
         assert body.drag is not None
@@ -44,9 +47,10 @@ def unseen(run: "ContactMotion") -> Array | None:
         pull = rotated(to_object[:, :-1], pull)
         force += pull
         moment += (rotated(to_object[:, :-1], twist) if body.dim == 2 else twist) - np.cross(com, pull)
-    linear = rotated(to_world[:, :-1], force / body.mass) @ run.table_axes
+    linear = rotated(to_world[:, :-1], force / mass[:, None, None]) @ run.table_axes
     angular = rotated(to_world[:, :-1], moment @ np.linalg.pinv(inertia)) @ run.table_axes
-    return (linear[..., None, :] + np.cross(angular[..., None, :], run.lever[:, :-1]))[..., :2]
+    away = rotated(to_world[:, :-1], offset) @ run.table_axes  # of a world whose CoM is elsewhere than it is believed
+    return (linear[..., None, :] + np.cross(angular[..., None, :], run.lever[:, :-1] + away[..., None, :]))[..., :2]
 
 
 def _damping(drag: JointDrag, dv: Array, dw: Array) -> tuple[Array, Array]:

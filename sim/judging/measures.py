@@ -1,11 +1,14 @@
 """The monitor: what a run's raw readings say about sticking, tracking and the contact force."""
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.solution import FAILED, INACCURATE
+from pivoting.models.contact_softness import ContactRows
+from pivoting.sim.judging.expected_force import expected_force
 from pivoting.sim.judging.implicit_step import unseen
 from pivoting.sim.judging.predicted_slip import RowEffects, drift, why_unknown
 
@@ -33,7 +36,8 @@ class Measures:
         contacts_missing: how many fewer contacts there are at the end than the scenario asks for.
         bounce_m: height that the landed face regains after the first moment with all these contacts.
         friction_use_max: measured |f_t| / (mu f_n) with the world's mu; nan if there never was a push.
-        force_mismatch_rel: RMS of measured minus predicted contact force over RMS of the predicted.
+        force_mismatch_rel: RMS of measured minus predicted contact force over RMS of the predicted; of a set of objects
+            that predicted of each world's own, see `expected_force`.
         residual_max: greatest KKT residual; inf where a step had no answer.
         unsolved_steps: steps without an answer within tolerance; within bounds is one.
     """
@@ -87,8 +91,9 @@ def _mismatch(run: "ContactMotion", steps: NDArray[np.bool_]) -> Array:
 
     But for those in which a body has landed on contacts that no stance holds: it shares the load with them.
     """
-    off = np.linalg.norm(run.force_measured - run.force, axis=-1)
-    size = np.linalg.norm(run.force, axis=-1)
+    force = expected_force(run) if run.scenario.in_sets and run.certified else run.force
+    off = np.linalg.norm(run.force_measured - force, axis=-1)
+    size = np.linalg.norm(force, axis=-1)
     if not run.scenario.limits.contacts_end or run.stance is not None:
         return _rms(off[:, steps]) / _rms(size[:, steps])
     each = [steps & ~landed for landed in run.landed]
@@ -97,10 +102,9 @@ def _mismatch(run: "ContactMotion", steps: NDArray[np.bool_]) -> Array:
 
 def _penetration(run: "ContactMotion") -> Array:
     """(W,) greatest depth [m] beyond that at which the soft contact balances the load."""
-    rows = run.world.contact_rows
-    load = (run.force if run.certified else run.force_measured)[..., -1].sum(axis=-1)
-    explained = 0.0 if rows is None else rows.depth(np.nan_to_num(load) / rows.points)
-    return np.maximum(run.log.contacts.depth - explained, 0.0).max(axis=1)
+    predicted = run.certified and not run.scenario.in_sets  # of a set each member has another load
+    load = (run.force if predicted else run.force_measured)[..., -1].sum(axis=-1)
+    return np.maximum(run.log.contacts.depth - run.world.depths(np.nan_to_num(load)), 0.0).max(axis=1)
 
 
 def _bounce(run: "ContactMotion") -> Array:
@@ -116,14 +120,43 @@ def predicted_slip(run: "ContactMotion") -> Array:
 
     Not-a-number from where it cannot.
     """
-    if run.world.contact_rows is None:
-        return np.full(run.slip.shape, np.nan)
-    point, omega = run.stepped[..., None, :], run.angular_velocity @ run.table_axes
-    turning, touching = run.turning - point, run.lever - point
-    path = drift(
-        run.world.contact_rows, _held(run), turning, touching, run.stepped_velocity, omega, unseen(run), _settle(run)
-    )
+    rows, point = [each.rows for each in run.world.truths], run.stepped[..., None, :]
+    given = {
+        "of": _held(run),
+        "turning": run.turning - point,
+        "touching": run.lever - point,
+        "velocity": run.stepped_velocity,
+        "omega": run.angular_velocity @ run.table_axes,
+        "unseen": unseen(run),
+    }
+    if len(rows) == 1:
+        return run.since_held(_drift(rows[0], given, run))
+    path = np.empty(run.slip.shape)
+    for first, worlds in _alike(rows):
+        path[worlds] = _drift(first, {name: _of_worlds(each, worlds) for name, each in given.items()}, run)
     return run.since_held(path)
+
+
+def _drift(rows: ContactRows | None, given: Mapping[str, Any], run: "ContactMotion") -> Array:
+    """Of worlds with the same law of the contact rows."""
+    if rows is None:
+        return np.full((len(given["turning"]), *run.slip.shape[1:]), np.nan)
+    return drift(rows, **given, settle=_settle(run))
+
+
+def _alike(rows: Sequence[ContactRows | None]) -> Iterator[tuple[ContactRows | None, NDArray[np.intp]]]:
+    """The worlds whose drift follows from the same numbers of their rows, and the rows of the first of them."""
+    laws = [None if each is None else (each.b, each.h, each.unknown) for each in rows]
+    for law in dict.fromkeys(laws):
+        worlds = np.flatnonzero([each == law for each in laws])
+        yield rows[worlds[0]], worlds
+
+
+def _of_worlds(values: Any, worlds: NDArray[np.intp]) -> Any:
+    """Those of some worlds, of an array or of all arrays of a named tuple."""
+    if values is None:
+        return None
+    return type(values)(*(each[worlds] for each in values)) if isinstance(values, tuple) else values[worlds]
 
 
 def _held(run: "ContactMotion") -> RowEffects:

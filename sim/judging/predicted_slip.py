@@ -18,6 +18,7 @@ body's turn are those of the run; where the contact went along the table is not 
 contact slides, and none holds one that has opened: the drift is then unknown. docs/fidelity.md derives and measures it.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple, Self
 
 import mujoco
@@ -61,22 +62,23 @@ class RowNumbers(NamedTuple):
     """What of `ContactRows` the compiled sum over contacts needs: numbers, for arrays take longer to compile.
 
     Attributes:
-        pyramidal, solimp, margin: of `ContactRows`.  mu, D: likewise, of both tangents.
+        pyramidal, margin: of `ContactRows`.
         axes: the table's t, o and n, world axes.
+        own: (W or 1, 9) what each world has of its own: mu and D of both tangents, and solimp.
     """
 
     pyramidal: bool
-    mu: tuple[float, ...]
-    D: tuple[float, ...]
-    solimp: tuple[float, ...]
     margin: float
     axes: tuple[tuple[float, ...], ...]
+    own: Array
 
     @classmethod
-    def of(cls, rows: ContactRows, axes: Array) -> Self:
-        """With the table's (t, o, n) as columns."""
-        mu, D, solimp = (tuple(values.tolist()) for values in (rows.mu, rows.D[1:], rows.solimp))
-        return cls(rows.pyramidal, mu, D, solimp, rows.margin, tuple(tuple(axis) for axis in axes.T.tolist()))
+    def of(cls, rows: Sequence[ContactRows | None], axes: Array) -> Self | None:
+        """Of each world, or one for all, with the table's (t, o, n) as columns; None where nothing touches."""
+        first, own = rows[0], [np.concatenate([each.mu, each.D[1:], each.solimp]) for each in rows if each is not None]
+        if first is None or len(own) < len(rows):
+            return None
+        return cls(first.pyramidal, first.margin, tuple(tuple(axis) for axis in axes.T.tolist()), np.array(own))
 
 
 class Sums(NamedTuple):
@@ -118,16 +120,19 @@ def begin_rows(sums):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def add_row(rows, push, pulls, depth, where, tangent, other, at, share, sums):  # type: ignore[no-untyped-def]
+def add_row(rows, world, push, pulls, depth, where, tangent, other, at, share, sums):  # type: ignore[no-untyped-def]
     """Add what the rows of one contact do; returns whether it slides, and adds nothing of one that does.
 
     Args:
-        rows: the values of `RowNumbers`.  push, pulls: its force along its normal and both tangents [N].
+        rows: the values of `RowNumbers`.  world: of which it is.
+        push, pulls: its force along its normal and both tangents [N].
         depth: [m].  where: its place [m].  tangent, other: both its tangents.
         at: (K, 3) where the declared contacts touch [m].  share: (K,) of it that each carries.
         sums: the values of `Sums`.
     """
-    pyramidal, mu, D, solimp, margin, axes = rows
+    pyramidal, margin, axes, numbers = rows
+    own = numbers[world % numbers.shape[0]]
+    mu, D, solimp = (own[0], own[1]), (own[2], own[3]), (own[4], own[5], own[6], own[7], own[8])
     shared, total, alone, number = sums
     K, use, lean = share.shape[0], (abs(pulls[0]) / mu[0], abs(pulls[1]) / mu[1]), (1.0, 1.0)
     if pyramidal:

@@ -10,9 +10,11 @@ from pivoting.models.frames import matrix
 from pivoting.models.names import geom_name
 from pivoting.models.rigid_body import file_frame, laid_over
 from pivoting.sim.pipeline.plan_log import plan_figures
+from pivoting.sim.scenarios.intervals import spelled
 
 if TYPE_CHECKING:
     from pivoting.sim.experiment import Experiment
+    from pivoting.sim.world import World
 
 Array = NDArray[np.float64]
 _CHOSEN = ("contacts", "coupling", "reason")  # of the contact settings, what the model itself does not say
@@ -29,7 +31,7 @@ def summary(run: "Experiment") -> dict[str, Any]:
         "length_unit_m": run.unit,
         "contacts": (run.unit * run.points).tolist(),
         "radius": (run.unit * run.world.radius).tolist(),
-        "changes": run.scenario.changes,
+        "changes": {key: spelled(value) for key, value in run.scenario.changes.items()},
         "resolved": run.scenario.resolved(run.load),
         "limits": asdict(run.limits),
         "controller": run.controller,
@@ -56,24 +58,26 @@ def summary(run: "Experiment") -> dict[str, Any]:
         "events": [event._asdict() for event in run.events],
         "engine_warnings": list(run.engine_warnings),
         **({} if run.plans is None else plan_figures(run.plans)),
+        **({} if run.world.values is None else {"worst_world_values": run.values_of(run.worst_world)}),
     }
 
 
 def _in_file(run: "Experiment") -> Array:
     """The first stance's contacts as --contact takes them, in the frame and unit of length of the body in its file."""
     origin, axes = file_frame(run.model, run.truth.index)
-    return (run.truth.com + run.points[run.stances[0].held] @ matrix(run.truth.axes).T - origin) @ axes
+    return (run.world.applied_at + run.points[run.stances[0].held] @ matrix(run.truth.axes).T - origin) @ axes
 
 
 def object_figures(run: "Experiment") -> dict[str, Any]:
-    """What was read of the object, as the world has it, in the frame that its file gives the body."""
-    origin, axes = file_frame(run.model, run.truth.index)
+    """What was read of the object, as the worst world has it, in the frame that its file gives the body."""
+    world = _worst(run)
+    origin, axes = file_frame(world.model, world.truth.index)
     return {
         "support": geom_name(run.model, run.truth.support),
-        "mass_kg": run.truth.mass,
-        "inertia_kg_m2": (run.unit**2 * np.asarray(run.truth.inertia)).tolist(),
-        "com_m": (run.unit * (run.truth.com - origin) @ axes).tolist(),
-        "mu": run.world.mu,
+        "mass_kg": world.truth.mass,
+        "inertia_kg_m2": (run.unit**2 * np.asarray(world.truth.inertia)).tolist(),
+        "com_m": (run.unit * (world.truth.com - origin) @ axes).tolist(),
+        "mu": world.mu,
         "contacts_m": (run.unit * _in_file(run)).tolist(),
         "radius_m": (run.unit * run.world.radius).tolist(),
         "damping": 0.0 if run.truth.drag is None else float(run.truth.drag.damping.max()),
@@ -83,15 +87,21 @@ def object_figures(run: "Experiment") -> dict[str, Any]:
 
 
 def contact_figures(run: "Experiment") -> dict[str, Any]:
-    """The support's contact parameters in the world, and what they replaced of the file."""
-    opt, geom = run.model.opt, run.truth.support
+    """The support's contact parameters in the worst world, and what they replaced of the file."""
+    world = _worst(run)
+    opt, geom = world.model.opt, world.truth.support
     return {
         "dt_s": float(opt.timestep),
-        "solref": run.model.geom_solref[geom].tolist(),
-        "solimp": run.model.geom_solimp[geom].tolist(),
+        "solref": world.model.geom_solref[geom].tolist(),
+        "solimp": world.model.geom_solimp[geom].tolist(),
         "impratio": float(opt.impratio),
         "cone": mujoco.mjtCone(int(opt.cone)).name.removeprefix("mjCONE_").lower(),
         "replaced": dict(run.world.replaced),
         "f_min_N": run.unit * float(run.attached.controller.belief.contacts.f_min.max()),
-        **({} if run.world.settings is None else {key: getattr(run.world.settings, key) for key in _CHOSEN}),
+        **({} if world.settings is None else {key: getattr(world.settings, key) for key in _CHOSEN}),
     }
+
+
+def _worst(run: "Experiment") -> "World":
+    """The worst world, as it is alone; where they are alike none has to be found."""
+    return run.world if run.world.differing is None else run.world.of(run.worst_world)

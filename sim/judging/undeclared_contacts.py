@@ -50,19 +50,20 @@ def stray_words(run: "Run", first: int = 0) -> list[str]:
         return []
     world = int(strays.sum(axis=1).argmax())
     last = int(np.flatnonzero(strays[world])[-1])
-    data, body = initial_data(run.model), run.truth.index
+    model = run.world.of(world).model
+    data, body = initial_data(model), run.truth.index
     data.qpos[:], data.qvel[:] = (values[world] for values in run.start)
     found: dict[tuple[int, int], float] = {}
     for step in range(last + 1):
         data.xfrc_applied[body] = run.wrench_world[world, step]
         if strays[world, step]:
-            mujoco.mj_forward(run.model, data)
+            mujoco.mj_forward(model, data)
             at = run.world.declared.touch(run.position[world, step], run.quaternion[world, step])
-            for own, other, contact in forced(run.model, data, body):
+            for own, other, contact in forced(model, data, body):
                 _, away = run.world.declared.share(np.array(contact.pos), at)
                 if other != run.truth.support or (away > run.world.declared.near and not run.world.declared.landing):
                     found.setdefault((own, other), float(run.time[step]))
-        mujoco.mj_step(run.model, data)
+        mujoco.mj_step(model, data)
     return [
         f"geom {label(run.model, own)} touches {label(run.model, other)}"
         + (" away from the contact" if other == run.truth.support else "")

@@ -1,5 +1,7 @@
 """The contacts of every step, sorted a few steps at once: all that MuJoCo lists of them would fill the memory."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.models.contact_softness import ContactRows
@@ -15,6 +17,7 @@ class ContactLog:
     """Sorts the contacts of every step into the log, some steps at once.
 
     Args:
+        rows: of each world, or one for all; None where nothing is known of them.
         sensors: where the readings of each are, see `models.sensors.instrument`.
         worlds: W.
         readings, held: of the log, (N, W, ...), in which they are written.
@@ -23,7 +26,7 @@ class ContactLog:
     def __init__(
         self,
         declared: Declared,
-        rows: ContactRows | None,
+        rows: Sequence[ContactRows | None],
         axes: Array,
         sensors: dict[str, slice],
         worlds: int,
@@ -32,8 +35,8 @@ class ContactLog:
     ):
         K, self.most = len(declared.points), max(1, BLOCK // worlds)
         places = [(sensors[key].start, sensors[key].stop) for key in ("contacts", "touching")]
-        known = None if rows is None else tuple(RowNumbers.of(rows, axes))
-        self._with = *places, tuple(declared), known, np.empty((K, 3)), np.empty(K), tuple(Sums.of(K))
+        known = RowNumbers.of(rows, axes)
+        self._with = *places, tuple(declared), known and tuple(known), np.empty((K, 3)), np.empty(K), tuple(Sums.of(K))
         self._kept = (*readings, *held)
         # contiguous, as the kernel takes them, whichever worlds of the log they are
         self._block = tuple(np.empty((self.most, worlds, *values.shape[2:]), values.dtype) for values in self._kept)

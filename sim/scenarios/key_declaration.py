@@ -14,7 +14,9 @@ from types import MappingProxyType, NoneType
 from typing import Any, TypeVar, get_args
 
 import numpy as np
+from pivoting.controller.uncertainty.uncertainty import Interval
 from pivoting.controller.validate import fail, number, one_of
+from pivoting.sim.scenarios.intervals import KIND, read_interval
 from pivoting.sim.scenarios.relative_values import MEANING, multiple
 
 T = TypeVar("T")
@@ -31,11 +33,13 @@ class Needs:
         key: the other key.
         words: what that has to be, or a function that tells it of the first key's name; None: anything but None.
         open_loop: whether the key has an effect in a run in open loop, too.
+        said: the condition in words, where `key` is an attribute of the values but no key.
     """
 
     key: str
     words: tuple[str, ...] | Callable[[str], tuple[str, ...]] | None = None
     open_loop: bool = False
+    said: str = ""
 
     def met(self, name: str, values: object, open_loop: bool) -> bool:
         """Whether the key `name` has an effect among these values, attributes of an object, in open loop or not."""
@@ -48,6 +52,8 @@ class Needs:
 
     def condition(self, name: str) -> str:
         """The condition for the key `name`, in words."""
+        if self.said:
+            return self.said
         words = self.words_of(name)
         if words is None:
             return f"{self.key} is set" + " or the run is in open loop" * self.open_loop
@@ -95,16 +101,24 @@ class Key:
         return int in self.types
 
     @property
+    def ranged(self) -> bool:
+        """Whether it may be an interval."""
+        return Interval in self.types
+
+    @property
     def allowed(self) -> str:
         """What it may be, in a few words."""
         if self.words is not None:
             return ", ".join(word + f" ({meaning})" * bool(str(meaning)) for word, meaning in self.words.items())
         within = " and ".join(f"{_SIGNS[bound]} {value:g}" for bound, value in self.limits.items())
-        return within + (f" {self.unit}" if self.unit else "") + (f", or 2{self.relative}" if self.relative else "")
+        also = (f", or 2{self.relative}" if self.relative else "") + ", or LOW:HIGH" * self.ranged
+        return within + (f" {self.unit}" if self.unit else "") + also
 
     @property
     def kind(self) -> str:
         """What is asked for, where text is none of it."""
+        if self.ranged:
+            return KIND
         return "a number" + (f", or in {MEANING[self.relative]}" if self.relative else "")
 
     def read(self, name: str, value: Any) -> Any:
@@ -113,6 +127,8 @@ class Key:
         Raises:
             ValueError: text that is no number, where one is asked for.
         """
+        if self.ranged:
+            value = read_interval(name, value)
         if self.words is not None or not isinstance(value, str):
             return value
         if multiple(value, self.relative) is not None:
@@ -132,6 +148,9 @@ class Key:
         if self.words is not None:
             if isinstance(value, str) or not (self._takes_objects and callable(value)):
                 one_of(name, value, tuple(self.words))
+        elif self.ranged and isinstance(value, Interval):
+            for end in value:
+                self.check(name, end, **limits)
         elif value is not None or not self.optional:
             times = multiple(value, self.relative)
             if times is None:

@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pivoting.controller.control_laws import Law
 from pivoting.controller.references import REFERENCES, Reference
+from pivoting.controller.uncertainty.uncertainty import Interval
 from pivoting.controller.validate import Array, fail, number, one_of
 from pivoting.models.length_unit import POWERS
 from pivoting.models.shipped_files import BODY, TABLE, scene_path
 from pivoting.sim.judging.verdict import Limits
+from pivoting.sim.scenarios.intervals import middle, read_interval, spelled
 from pivoting.sim.scenarios.key_declaration import Key, declared_keys, documented
 from pivoting.sim.scenarios.relative_values import Load, absolute
 from pivoting.sim.scenarios.scenario_keys import (
@@ -23,9 +25,9 @@ from pivoting.sim.scenarios.scenario_keys import (
     BOUND_KEYS,
     HIDDEN_KEYS,
     LOWEST,
-    SCENE_KEYS,
     ScenarioKeys,
 )
+from pivoting.sim.scenarios.set_values import actual_values, believed_values, differing_values
 
 if TYPE_CHECKING:  # what is compiled is imported when it is needed: a list of scenarios needs none of it
     from pivoting.controller.wrench_bounds import WrenchBounds
@@ -45,6 +47,10 @@ class Scenario(ScenarioKeys):
     moment with the lever from contact to CoM, of a rate per second; durations to its natural time, "3T"; see
     `relative_values`. `absolute` resolves them.
 
+    mass, inertia, mu and the coordinates of the centre of mass may be intervals, (0.8, 1.2) or "0.8:1.2": the
+    controller is told that they are somewhere in there and takes the middle for nominal, and each world has its own,
+    see `worlds_at`, unless `world` says which. Intervals in `world` are of the worlds alone.
+
     Attributes:
         name, summary: shown by `pivoting list`.
         scene: name of an MJCF file in models/, or the path of one of your own.
@@ -54,7 +60,7 @@ class Scenario(ScenarioKeys):
         chosen: whether the object's own contact and solver parameters give way to those of the shipped scenes.
         about: "tilt" (theta lifts the object off its face) or "yaw" (with the CoM straight above the contact, theta
             turns it about the table's normal).
-        world: values by key of the object that the simulated world alone has.
+        world: values by key of the object that the simulated world alone has, or intervals.
         limits: the thresholds of the verdict.
         given: what was set with `change`, as the command line spells it.
     """
@@ -67,7 +73,7 @@ class Scenario(ScenarioKeys):
     contact: str | ArrayLike = "corner"
     chosen: bool = False
     about: str = "tilt"
-    world: Mapping[str, float] = field(default_factory=dict)
+    world: Mapping[str, float | Interval] = field(default_factory=dict)
     limits: Limits = field(default_factory=Limits)
     given: frozenset[str] = field(default=frozenset(), compare=False)
 
@@ -79,10 +85,13 @@ class Scenario(ScenarioKeys):
         one_of("about", self.about, ("tilt", "yaw"))
         corner = isinstance(self.contact, str) and self.contact == "corner"
         for name, key in self._keys.items():
+            if key.ranged:
+                object.__setattr__(self, name, read_interval(name, getattr(self, name)))
             turned = name in ("theta", "theta_end") and not corner  # what an object allows, its plan knows
             key.check(name, getattr(self, name), **(ANY_ANGLE if turned else {}))
-        object.__setattr__(self, "world", MappingProxyType(dict(self.world)))
-        for name, value in self.world.items():
+        hidden = {name: self._hidden(name, value).read(f"world.{name}", value) for name, value in self.world.items()}
+        object.__setattr__(self, "world", MappingProxyType(hidden))
+        for name, value in hidden.items():
             self._hidden(name, value).check(f"world.{name}", value)
         if not isinstance(self.scene, str):
             object.__setattr__(self, "scene", Path(self.scene))
@@ -117,13 +126,23 @@ class Scenario(ScenarioKeys):
 
     @property
     def believed(self) -> dict[str, float]:
-        """Changes to the scene that the controller knows of."""
-        return {key: getattr(self, key) for key in SCENE_KEYS if getattr(self, key) is not None}
+        """Changes to the scene that the controller knows of; of intervals it takes the middle."""
+        return {key: middle(value) for key, value in believed_values(self).items()}
 
     @property
     def actual(self) -> dict[str, float]:
-        """Changes to the scene that is simulated."""
-        return {**self.believed, **self.world}
+        """Changes to the scene that is simulated; in the middle of what is `differing`."""
+        return {key: middle(value) for key, value in actual_values(self).items()}
+
+    @property
+    def differing(self) -> Mapping[str, Interval] | None:
+        """The intervals, by key of the object, from which each world has a value of its own; None: they are alike."""
+        return differing_values(self) or None
+
+    @property
+    def in_sets(self) -> bool:
+        """Whether anything of the object is an interval, to the controller or in the world."""
+        return any(isinstance(value, Interval) for value in (*believed_values(self).values(), *self.world.values()))
 
     @property
     def reference_keys(self) -> tuple[str, ...]:
@@ -174,7 +193,7 @@ class Scenario(ScenarioKeys):
     @property
     def label(self) -> str:
         """Name and changes, in the words of the command line."""
-        return " ".join([self.name, *(f"{key}={value}" for key, value in self.changes.items())])
+        return " ".join([self.name, *(f"{key}={spelled(value)}" for key, value in self.changes.items())])
 
     @property
     def stages(self) -> dict[str, float]:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from pivoting.controller.validate import InputError, one_of
 from pivoting.sim.keep import KEEP
+from pivoting.sim.scenarios.intervals import spelled
 from pivoting.sim.scenarios.scenario import Scenario
 from pivoting.sim.scenarios.shipped_scenarios import own_object, scenario, shipped
 
@@ -106,7 +107,8 @@ def written(file: ScenarioFile) -> dict[str, Any]:
 
 def expressible(case: Scenario) -> bool:
     """Whether the scenario that is read from its file is this one in all that has an effect."""
-    if not all(isinstance(value, _PLAIN) for value in case.changes.values()) or not isinstance(case.reference, str):
+    plain = all(isinstance(spelled(value), _PLAIN) for value in case.changes.values())
+    if not plain or not isinstance(case.reference, str):
         return False
     try:
         again = _scenario(json.loads(json.dumps(_said(case))), Path())
@@ -219,4 +221,5 @@ def _points(contact: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
+    value = spelled(value)
     return int(value) if isinstance(value, np.integer) else value if isinstance(value, _PLAIN) else str(value)

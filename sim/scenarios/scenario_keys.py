@@ -5,23 +5,21 @@ from dataclasses import dataclass
 from pivoting.controller.control_laws import FORMULATIONS
 from pivoting.controller.planning.integrators import INTEGRATORS
 from pivoting.controller.references import REFERENCES, Reference
-from pivoting.models.mujoco_constants import LEAST_FRICTION
 from pivoting.sim.scenarios.key_declaration import Needs, declared_keys, key
+from pivoting.sim.scenarios.object_keys import OBJECT, SCENE, ObjectKeys
 
 LOWEST = 0.1  # [deg] from a face: closer, the next corner touches the table too
 ANY_ANGLE = {"at_least": -360.0, "at_most": 360.0}  # [deg] of an object whose plan knows what its shape allows
 LARGEST = 1e30  # [N] so that squares of forces are finite
 
 # What the keys are of. Those of the object may be believed to be other than they are, see `Scenario.world`.
-OBJECT = "the object and its support; as world.KEY of the world alone, which the controller does not know of"
 REFERENCE = "the reference"
 CONTROLLER = "the controller"
 BOUNDS = "the bounds on the wrench, in object axes"
 HORIZON = "the receding horizon"
 STAGES = "the stages before and after the controller"
 SIMULATOR = "the simulator"
-
-SCENE = "as the scene has it"
+UNCERTAINTY = "what the controller does not know exactly, beside the object's keys that are intervals"
 
 
 def _made_of(key: str) -> tuple[str, ...]:
@@ -34,45 +32,8 @@ _PLANS, _PLANS_OR_PLAYS = Needs("plan_hz"), Needs("plan_hz", open_loop=True)
 
 
 @dataclass(frozen=True, kw_only=True)
-class ScenarioKeys:
+class ScenarioKeys(ObjectKeys):
     """The values of a scenario that `--set` changes. Angles are in degrees here and in radians everywhere else."""
-
-    mu: float | None = key(
-        None,
-        f"friction coefficient between the object and its support (MuJoCo needs more than {LEAST_FRICTION:g})",
-        group=OBJECT,
-        above=0.0,
-        at_most=10.0,
-        none=SCENE,
-    )
-    mass: float | None = key(None, "mass of the object", group=OBJECT, unit="kg", above=0.0, none=SCENE)
-    size: float | None = key(
-        None,
-        "longest side of the object, which has to be a single box",
-        group=OBJECT,
-        unit="m",
-        above=0.0,
-        at_most=1e3,
-        none=SCENE,
-    )
-    incline: float | None = key(
-        None,
-        "angle by which the support rises to the right",
-        group=OBJECT,
-        unit="deg",
-        above=-90.0,
-        below=90.0,
-        none=SCENE,
-    )
-    gravity: float | None = key(
-        None,
-        "magnitude of gravity, whose direction stays that of the scene",
-        group=OBJECT,
-        unit="m/s^2",
-        at_least=0.0,
-        at_most=1e3,
-        none=SCENE,
-    )
 
     reference: str | Reference = key(
         "constant", "motion that the object is to follow", group=REFERENCE, words=REFERENCES
@@ -232,6 +193,38 @@ class ScenarioKeys:
         needs=_PLANS_OR_PLAYS,
     )
 
+    shove: float = key(
+        0.0,
+        "greatest impulse of a shove at the centre of mass, in any direction, for each kg",
+        group=UNCERTAINTY,
+        unit="N s/kg",
+        at_least=0.0,
+        at_most=1e3,
+    )
+    theta_error: float = key(
+        0.0,
+        "greatest error of the measured orientation about any axis",
+        group=UNCERTAINTY,
+        unit="deg",
+        at_least=0.0,
+        at_most=90.0,
+    )
+    omega_error: float = key(
+        0.0,
+        "greatest error of the measured angular velocity about any axis",
+        group=UNCERTAINTY,
+        unit="deg/s",
+        at_least=0.0,
+        at_most=1e5,
+    )
+    worlds_at: str = key(
+        "drawn",
+        "which members of the set of intervals the worlds are",
+        group=UNCERTAINTY,
+        words={"drawn": "at random, each by its number and the seed", "vertices": "each vertex in turn"},
+        needs=Needs("differing", said="a key of the object is an interval"),
+    )
+
     noise: float = key(
         0.0,
         "greatest error of the measured orientation about each axis, drawn anew in each step",
@@ -287,7 +280,7 @@ def _of(*groups: str) -> tuple[str, ...]:
     return tuple(name for name, declared in KEYS.items() if declared.group in groups)
 
 
-SCENE_KEYS = _of(OBJECT, SIMULATOR)  # each of which is a change of `models.scene_changes`
+SCENE_KEYS = tuple(name for name in _of(OBJECT, SIMULATOR) if name != "com")  # the changes of `models.scene_changes`
 HIDDEN_KEYS = _of(OBJECT)  # that the world may have and no one know
 CONTROL_KEYS = _of(CONTROLLER)  # of the controller alone
 BOUND_KEYS = _of(BOUNDS)

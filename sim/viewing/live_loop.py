@@ -13,6 +13,7 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 from pivoting.controller.references import Reference
+from pivoting.controller.rotations import rotated
 from pivoting.controller.validate import fail
 from pivoting.models.frames import matrix
 from pivoting.sim.drawing.drawn_world import FAR
@@ -81,7 +82,7 @@ class LiveLoop:
         """Go on with these worlds."""
         self._batch, self._plant = batch, Plant(batch, self._whole.world.sensors)
         wrench_map = self._whole.belief.attached.controller.belief.source.map
-        self._apply = PushedWrench(batch, wrench_map, self._whole.world.truth.index)
+        self._apply = PushedWrench(batch, wrench_map, self._whole.world.truth.index, self._whole.world.offsets)
 
     def _begin_cycle(self) -> None:
         """The scenario's own motion from its beginning, in as many laps as it takes."""
@@ -271,8 +272,14 @@ class LiveLoop:
         """End a push."""
         self._apply.steps = 0
 
+    @property
+    def _com(self) -> Array:
+        """(3,) the true centre of mass, world axes."""
+        position, offsets = self.states.position[0], self._whole.world.offsets
+        return position if offsets is None else position - rotated(self.states.orientation[0], offsets[0])
+
     def _push(self, force: Array, at: Array | None, steps: int) -> None:
-        away = np.zeros(3) if at is None else at - self.states.position[0]
+        away = np.zeros(3) if at is None else at - self._com
         self._apply.push[:] = *force, *np.cross(away, force)
         self._apply.steps = steps
 

@@ -110,7 +110,7 @@ class LiveScene:
     def hit(self, origin: Array, direction: Array) -> Array | None:
         """(3,) where a ray meets what can move, world axes; None if it does not."""
         run, geom = self.world.run, np.array([-1], np.int32)
-        place(run.model, self._data, run.truth, run.quaternion[0, -1], run.truth.com, run.position[0, -1])
+        place(run.model, self._data, run.truth, run.quaternion[0, -1], run.world.applied_at, run.position[0, -1])
         mujoco.mj_kinematics(run.model, self._data)
         far = mujoco.mj_ray(run.model, self._data, origin, direction, None, False, -1, geom)
         return origin + far * direction if far >= 0.0 else None
