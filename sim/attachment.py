@@ -12,6 +12,7 @@ from pivoting.controller.motion import Motion
 from pivoting.controller.rotations import quaternion_product
 from pivoting.controller.solution import Solution
 from pivoting.controller.solvers.solve import solve
+from pivoting.controller.uncertainty.uncertainty import Uncertainty
 from pivoting.controller.validate import array, fail
 from pivoting.controller.wrench_controller import WrenchController
 from pivoting.errors import PivotingError
@@ -123,6 +124,7 @@ def attach(
     Q_w: ArrayLike | None = None,
     Q_f: ArrayLike | None = None,
     support: str | None = None,
+    uncertainty: Uncertainty | None = None,
 ) -> Attached:
     """Make a controller for a body of `model`: mass, inertia, CoM, gravity, friction and table are read from it.
 
@@ -142,6 +144,7 @@ def attach(
         f_min: floor of the normal force [N].
         Q_w, Q_f: weights, see `WrenchProblem`; Q_w defaults to the lever of the contact as characteristic length.
         support: name of the geom that the body stands on; default what is under it in the first keyframe, or at qpos0.
+        uncertainty: what is not known of the body, about what is read of the model; every member's contact is to stick.
 
     Raises:
         ModelError: the model cannot be served, with the reason.
@@ -165,6 +168,7 @@ def attach(
         found.gravity,
         base=found.table,
         margin=margin,
+        uncertainty=uncertainty,
         Q_w=Q_w,
         Q_f=Q_f,
     )

@@ -92,6 +92,7 @@ def believe(case: Scenario, read: Scene, worlds: int = 1, given: Controllers = N
         f_min=_floor(case.absolute(there.load), there) / read.unit,
         Q_w=case.wrench_weight(there.body.dim, read.unit),
         support=case.support,
+        uncertainty=believed if case.guarantee == "set" else None,
     )
     attached = own(contacts=list(there.contacts), radius=there.radius)
     if case.landing == "ignored":

@@ -77,12 +77,13 @@ def set_of(unknown, i):  # type: ignore[no-untyped-def]
 
 @kernel
 def step_worlds(  # type: ignore[no-untyped-def]
-    beliefs, bounds, own, planar, several, tolerance, states, desired, external, out, status
+    beliefs, unknown, bounds, own, planar, several, tolerance, states, desired, external, out, status
 ):  # fmt: skip
     """Make, solve and certify the wrench problem of every world.
 
     Args:
-        beliefs: of the worlds, or one that they share, see `belief.for_worlds`.
+        beliefs, unknown: of the worlds, or one that they share, and the sets in which they are believed to be, or None;
+            see `belief.for_worlds`.
         bounds: the values of `WrenchBounds.stacked`, or None. One that is not on a rate is kept, as a heavier weight;
             where that needs more than `HEAVIEST` times the weight, or a second bound, the answer is that without any.
         own, planar, several: `WrenchController.workspace()`.
@@ -97,7 +98,7 @@ def step_worlds(  # type: ignore[no-untyped-def]
             force (K d), contact axes; residual.
         status: (W,) int8, written: 0 solved, 1 inaccurate, 2 failed.
     """
-    (masses, inertias, gravities), all_held, (wrench_map, weights), law, unknown = beliefs
+    (masses, inertias, gravities), all_held, (wrench_map, weights), law = beliefs
     each, nw, last = masses.shape[0], wrench_map.shape[0], out.shape[1] - 1
     R, J, heavier, root, guard = own
     for i in range(states.shape[0]):

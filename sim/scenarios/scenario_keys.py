@@ -118,6 +118,12 @@ class ScenarioKeys(ObjectKeys):
     margin: float = key(
         1.0 / 6.0, "share of the friction that is kept unused", group=CONTROLLER, at_least=0.0, below=1.0
     )
+    guarantee: str = key(
+        "set",
+        "for which worlds the contact is to stick, where something is told as an interval",
+        group=CONTROLLER,
+        words={"set": "every world of the set", "none": "the nominal one alone"},
+    )
     landing: str = key(
         "ignored",
         "what follows once the object lies on its face",
