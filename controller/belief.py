@@ -100,11 +100,12 @@ class Belief(NamedTuple):
 SHARED = ("turning", "force_map", "map", "about_contact")  # arrays that are the same for all worlds
 
 
-def for_worlds(beliefs: Sequence[Belief]) -> tuple[tuple[object, ...] | None, ...]:
+def for_worlds(beliefs: Sequence[Belief]) -> tuple[tuple[object, ...], tuple[object, ...] | None]:
     """The beliefs of W worlds, or one that they share, as `step_worlds` takes them.
 
     Returns:
-        The values of `Belief` and of its parts in plain tuples, all but the `SHARED` with a leading axis of W or 1.
+        The values of `Belief` and of its parts in plain tuples, all but the `SHARED` with a leading axis of W or 1; and
+        those of the sets apart from them, because what is None is left out by the compiler if it is an argument.
 
     Raises:
         ValueError: they are not of one law and of as many contacts of the same kind; the first that differs is named.
@@ -118,7 +119,8 @@ def for_worlds(beliefs: Sequence[Belief]) -> tuple[tuple[object, ...] | None, ..
                 "one with the law of controller[0], and as many contacts of the same kind",
             )
     stacked = (_stacked(parts) for parts in ([belief[part] for belief in beliefs] for part in range(3)))
-    return (*stacked, first.law, None if first.unknown is None else _stacked([belief.unknown for belief in beliefs]))
+    unknown = None if first.unknown is None else _stacked([belief.unknown for belief in beliefs])
+    return (*stacked, first.law), unknown
 
 
 def _kind(belief: Belief) -> list[object]:

@@ -15,7 +15,7 @@ from pivoting.controller.belief import Belief, BelievedObject, HeldContacts, Wre
 from pivoting.controller.contacts import Contact
 from pivoting.controller.control_laws import Body, Law
 from pivoting.controller.kernels.compiled_step import state_cones, state_problem
-from pivoting.controller.kernels.workspace import MEMBERS, guard_scratch, several_workspace, workspace
+from pivoting.controller.kernels.workspace import MEMBERS, guard, several_workspace, workspace
 from pivoting.controller.motion import Motion
 from pivoting.controller.plane_and_space import Space, space
 from pivoting.controller.rotations import IDENTITY, rotation_matrix
@@ -141,12 +141,12 @@ class WrenchController:
     def workspace(self) -> tuple[tuple[Any, ...] | None, ...]:
         """Scratch of the compiled loop, one for each thread."""
         nw, n = len(self.Q_w), len(self.Q_f)
-        K, dim, guard = len(self.contacts), self.space.dim, None
+        K, dim, scratch = len(self.contacts), self.space.dim, None
         planar, several = workspace(nw, K, dim)
         if self.uncertainty is not None:
-            guard = guard_scratch(nw, K, dim)
+            scratch = guard(nw, K, dim)
             several = None if several is None else several_workspace(nw, K, dim, MEMBERS)
-        own = np.empty((3, 3)), np.empty((nw, n)), np.empty((nw, nw)), np.empty(6), guard
+        own = np.empty((3, 3)), np.empty((nw, n)), np.empty((nw, nw)), np.empty(6), scratch
         return own, planar, several
 
     def jacobian(self, orientation: Array) -> Array:
@@ -170,10 +170,10 @@ class WrenchController:
         J, required = self._stated(measured, self.space.lift_motion(target))
         held, floors, apex = self.belief.contacts, self.belief.contacts.f_min, None
         if self.uncertainty is not None:
-            guard = guard_scratch(len(required), len(self.contacts), self.space.dim)
+            scratch = guard(len(required), len(self.contacts), self.space.dim)
             seen = [np.array(values) for values in measured]
-            members, _ = state_cones(self.belief, *seen, np.empty((3, 3)), required, guard)
-            apex, floors = guard[6][:members], guard[1]
+            members, _ = state_cones(self.belief, *seen, np.empty((3, 3)), required, scratch)
+            apex, floors = scratch.apex[:members], scratch.floor
         if external is not None:
             required -= array("external", external, required.shape)
         # as it was given, where it is: (1 - margin) mu is to be the same to the last bit

@@ -185,7 +185,7 @@ def test_a_bound_is_a_heavier_weight(controller: WrenchController, kind: str) ->
         q, q_d = tilted(angle)[None], tilted(wanted)[None]
         own, none = tuple(bounds.stacked(nw)), np.zeros((1, nw))
         state, desired = np.hstack([still, q, still, still]), np.hstack([q_d, still, still])
-        step_worlds(belief, own, *work, 1e-9, state, desired, none, out, status)
+        step_worlds(*belief, own, *work, 1e-9, state, desired, none, out, status)
         assert status[0] == 0
         return tuple(np.split(out[0, :-1], [nw, 2 * nw]))
 

@@ -53,7 +53,7 @@ def stepped(
     reference = np.concatenate(controller.space.lift_motion(desired))[None]
     known = np.zeros((1, nw)) if external is None else external
     belief = for_worlds([controller.belief])
-    step_worlds(belief, None, *controller.workspace(), tolerance, states(q, omega), reference, known, out, status)
+    step_worlds(*belief, None, *controller.workspace(), tolerance, states(q, omega), reference, known, out, status)
     return Stepped(*np.split(out[:, :-1], [nw, 2 * nw], axis=1), out[:, -1], status)
 
 

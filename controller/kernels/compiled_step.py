@@ -6,7 +6,7 @@ from pivoting.controller.contacts import fill_jacobian
 from pivoting.controller.kernels.compilation import kernel, subroutine
 from pivoting.controller.kernels.guarded_interior_point import guarded_wrench
 from pivoting.controller.kernels.interior_point import contact_wrench
-from pivoting.controller.kernels.planar_closed_form import planar_wrench, state_from_apex
+from pivoting.controller.kernels.planar_closed_form import planar_wrench, state_from_tip
 from pivoting.controller.kernels.required_wrench import fill_required
 from pivoting.controller.kernels.worst_member_forces import move_cones
 from pivoting.controller.kernels.worst_planar_force import move_planar_cone
@@ -41,7 +41,7 @@ def state_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ig
 
 @kernel
 def state_cones(belief, q, omega, R, b, guard):  # type: ignore[no-untyped-def]
-    """Write where all members of the believed set ask the cones to be, into `guard`, of `guard_scratch`.
+    """Write where all members of the believed set ask the cones to be, into a `Guard`.
 
     Args:
         belief: the values of a `Belief`, with a set.  b: (nw,) the required wrench.  R: (3, 3) scratch.
@@ -56,7 +56,7 @@ def guard_state(R, omega, b, moved, held, wrench_map, unknown, guard):  # type: 
     """Write the apexes and floors that all members ask for; returns how many members, and what had to be added [N]."""
     if held.Q_f.shape[0] == 2:
         return 1, move_planar_cone(R, omega, b, moved, held, wrench_map, unknown, guard)
-    return move_cones(R, omega, b, moved, held, wrench_map, unknown, guard[7], guard[6], guard[1])
+    return move_cones(R, omega, b, moved, held, wrench_map, unknown, guard)
 
 
 @subroutine
@@ -114,15 +114,13 @@ def step_worlds(  # type: ignore[no-untyped-def]
         if unknown is not None and planar is not None:
             move_planar_cone(R, omega, b, moved, held, wrench_map, set_of(unknown, mine), guard)
         if unknown is not None and several is not None:
-            members, _ = move_cones(
-                R, omega, b, moved, held, wrench_map, set_of(unknown, mine), guard[7], guard[6], guard[1]
-            )
+            members, _ = move_cones(R, omega, b, moved, held, wrench_map, set_of(unknown, mine), guard)
         for row in range(nw):
             b[row] -= external[i % external.shape[0], row]
         if unknown is not None and planar is not None:
             for a in range(2):
-                guard[0][a] = guard[6][0, 0, a]
-            state_from_apex(J, b, Q_f, f_min, guard)
+                guard.tip[a] = guard.apex[0, 0, a]
+            state_from_tip(J, b, Q_f, f_min, guard)
         ball, multiplier, Q = -1, 0.0, Q_w
         for attempt in range(ATTEMPTS + 1):
             if bounds is not None:
@@ -132,11 +130,13 @@ def step_worlds(  # type: ignore[no-untyped-def]
             if planar is not None and unknown is None:
                 residual = planar_wrench(J, b, Q, Q_f, mu, f_min, force, wrench, planar)
             if planar is not None and unknown is not None:
-                residual = planar_wrench(J, guard[2], Q, Q_f, mu, guard[1], force, wrench, planar, guard[3])
+                residual = planar_wrench(J, guard.left, Q, Q_f, mu, guard.floor, force, wrench, planar, guard.linear)
             if several is not None and unknown is None:
                 residual = contact_wrench(J, b, Q, Q_f, mu, f_min, force, wrench, several)
             if several is not None and unknown is not None:
-                residual = guarded_wrench(J, b, Q, Q_f, mu, guard[1], guard[6][:members], force, wrench, several, guard)
+                residual = guarded_wrench(
+                    J, b, Q, Q_f, mu, guard.floor, guard.apex[:members], force, wrench, several, guard
+                )
             if bounds is None:
                 break
             if attempt == 0:
@@ -154,7 +154,7 @@ def step_worlds(  # type: ignore[no-untyped-def]
             if attempt >= ATTEMPTS - 1 or not multiplier <= HEAVIEST * root[5]:  # out of reach: as without bounds
                 ball = -1
         if unknown is not None and planar is not None:
-            force[0], force[1] = force[0] + guard[0][0], force[1] + guard[0][1]
+            force[0], force[1] = force[0] + guard.tip[0], force[1] + guard.tip[1]
         out[i, last] = residual
         if not np.isfinite(residual):
             status[i] = FAILED

@@ -1,8 +1,9 @@
 """The optimum where each contact force has to be in several moved cones at once: one for every member of a set.
 
 min 1/2 f'H f - h'f  s.t.  (mu (f_n - a_n), f_t - a_t, f_o - a_o) in the second-order cone for every apex a, and
-f_n >= f_min. It is the method of `interior_point`, without its polish: several cones can bind the same force. Every iterate is
-strictly feasible, so that what the last one lacks is optimality, which its multipliers certify.
+f_n >= f_min. Where one cone at each contact decides, it is found in a few tries. Else it is the method of
+`interior_point`, without its polish, since several cones bind the same force. Every iterate is strictly feasible, so
+that what the last one lacks is optimality, which its multipliers certify.
 """
 
 import numpy as np
@@ -10,9 +11,11 @@ from pivoting.controller.kernels.compilation import kernel, subroutine
 from pivoting.controller.kernels.interior_point import ITERATIONS, advance, contact_wrench, free_minimum, start
 from pivoting.controller.kernels.nesterov_todd import correct, predict
 from pivoting.controller.kernels.newton_polish import gradient
-from pivoting.controller.kernels.planar_closed_form import balancing_wrench, reduce, state_from_apex
+from pivoting.controller.kernels.planar_closed_form import balancing_wrench, reduce, state_from_tip
 from pivoting.controller.kernels.workspace import Q, opened
 
+CHOICES = 4  # of one cone at each contact, before all are taken together
+OUTSIDE = 1e-12  # of the forces: what rounding leaves of a force on the edge of its cone
 SMALLEST = 1e-15  # relative gap at which there is nothing to improve
 STALLED = 4  # steps without progress after which rounding has the last word
 
@@ -74,21 +77,53 @@ def guarded_wrench(J, b, Q_w, Q_f, mu, f_min, apex, f, w, scratch, guard):  # ty
     Args:
         f_min: (K,) floors [N], from 0.
         apex: (V, K, d) of all cones; the highest of each contact takes the first place.
-        scratch: of `workspace`, for V cones at each contact.  guard: of `guard_scratch`.
+        scratch: of `workspace`, for V cones at each contact.  guard: a `Guard`.
         Others: as `contact_wrench`.
     """
     K, dim = apex.shape[1:]
-    a, floor, left, linear = guard[0], guard[1], guard[2], guard[3]
+    a, floor, left, linear, chosen = guard.tip, guard.floor, guard.left, guard.linear, guard.chosen
+    for k in range(K):
+        chosen[k] = 0
+        for v in range(1, apex.shape[0]):
+            if apex[v, k, dim - 1] > apex[chosen[k], k, dim - 1]:
+                chosen[k] = v
+    for _ in range(CHOICES):  # one cone at each contact often decides, and which it is shows
+        for k in range(K):
+            floor[k] = f_min[k]
+            for i in range(dim):
+                a[dim * k + i] = apex[chosen[k], k, i]
+        state_from_tip(J, b, Q_f, f_min, guard)
+        residual = contact_wrench(J, left, Q_w, Q_f, mu, floor, f, w, scratch, linear)
+        for i in range(f.shape[0]):
+            f[i] += a[i]
+        if not _choose_again(apex, mu, f, chosen):
+            return residual
     cones = list_cones(apex, mu, scratch)
     for k in range(K):
         floor[k] = f_min[k]
         for i in range(dim):
             a[dim * k + i] = apex[0, k, i]
-    state_from_apex(J, b, Q_f, f_min, guard)
+    state_from_tip(J, b, Q_f, f_min, guard)
     residual = _from_apex(J, left, Q_w, Q_f, mu, floor, cones, f, w, scratch, linear)
     for i in range(f.shape[0]):
         f[i] += a[i]
     return residual
+
+
+@subroutine
+def _choose_again(apex, mu, f, chosen):  # type: ignore[no-untyped-def]
+    """Choose at each contact the cone that its force is farthest outside of; returns whether there is one."""
+    V, K, dim = apex.shape
+    again = False
+    for k in range(K):
+        t, n = dim * k, dim * (k + 1) - 1
+        worst = OUTSIDE * (abs(f[n]) + abs(apex[chosen[k], k, dim - 1]))
+        for v in range(V):
+            x, y = f[t] - apex[v, k, 0], f[t + 1] - apex[v, k, 1] if dim == 3 else 0.0
+            outside = np.sqrt(x * x + y * y) - mu[k] * (f[n] - apex[v, k, dim - 1])
+            if not outside <= worst:  # also when nan
+                worst, chosen[k], again = outside, v, True
+    return again
 
 
 @subroutine

@@ -115,13 +115,13 @@ def balancing_wrench(J, b, f, w):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def state_from_apex(J, b, Q_f, f_min, guard):  # type: ignore[no-untyped-def]
-    """State a problem in f - a, a being the cones' apex (n,): the wrench that is left, the linear cost, the floors.
+def state_from_tip(J, b, Q_f, f_min, guard):  # type: ignore[no-untyped-def]
+    """State a problem in f - a, a being the cones' tip (n,): the wrench that is left, the linear cost, the floors.
 
     Args:
-        guard: of `guard_scratch`, with the apex and the floors [N] from 0, which become those from the apex.
+        guard: a `Guard`, with the tip and with the floors [N] from 0, which become those from the tip.
     """
-    a, floor, left, linear = guard[0], guard[1], guard[2], guard[3]
+    a, floor, left, linear = guard.tip, guard.floor, guard.left, guard.linear
     nw, n = J.shape
     for i in range(nw):
         left[i] = b[i]

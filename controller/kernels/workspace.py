@@ -88,13 +88,43 @@ def opened(scratch, cones):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-def guard_scratch(nw: int, K: int, dim: int) -> tuple[Any, ...]:
-    """The scratch for moving cones: an apex (n,), floors (K,), the wrench required from there (nw,), linear cost (n,).
+class Guard(NamedTuple):
+    """Scratch for cones that are moved; the problem is stated from the apex of one cone at each contact, the tip."""
 
-    Then, for one contact in the plane, corner (4, 2) and ends (3, 2), see `planar_moved_cone`, and the apexes of all
-    members, (`MEMBERS`, K, d), of which the plane needs one; and what `move_cones` needs for the others.
-    """
-    n, one = K * dim, K * dim == 2
-    members = np.zeros(5), np.zeros((4, 3)), np.zeros((K, 5, 3)), np.zeros((3, 3)), np.zeros((K, dim)), np.zeros((K, 2))
-    apex = np.zeros((1 if one else MEMBERS, K, dim))
-    return np.zeros(n), np.zeros(K), np.zeros(nw), np.zeros(n), np.zeros((4, 2)), np.zeros((3, 2)), apex, members
+    tip: Array  # (n,)
+    floor: Array  # (K,): floors, from 0 and then from the tip
+    left: Array  # (nw,): the wrench that is required beside forces at the tips
+    linear: Array  # (n,): the linear cost of what the forces are more than that
+    apex: Array  # (V, K, d): of all members, `MEMBERS`, or of one contact in the plane the one that they have in common
+    chosen: NDArray[np.int64]  # (K,): the member that decides at each contact
+    corner: Array  # (4, 2) and (3, 2): see `worst_planar_force`
+    ends: Array
+    place: Array  # (5,), (4, 3), (K, 5, 3), (3, 3), (K, d), (K, 2): see `worst_member_forces`
+    state: Array
+    frame: Array
+    tensor: Array
+    force: Array
+    lifted: Array
+
+
+def guard(nw: int, K: int, dim: int) -> Guard:
+    """The scratch for one problem size."""
+    n, members = K * dim, 1 if K * dim == 2 else MEMBERS
+    shapes = (
+        (n,),
+        (K,),
+        (nw,),
+        (n,),
+        (members, K, dim),
+        (4, 2),
+        (3, 2),
+        (5,),
+        (4, 3),
+        (K, 5, 3),
+        (3, 3),
+        (K, dim),
+        (K, 2),
+    )
+    *first, corner = (np.zeros(shape) for shape in shapes[:6])
+    chosen, rest = np.zeros(K, dtype=np.int64), (np.zeros(shape) for shape in shapes[6:])
+    return Guard._make([*first, chosen, corner, *rest])

@@ -1,12 +1,13 @@
 """The contact forces of the members of an `Uncertainty`, in space or with several contacts.
 
 With f the contact forces that the controller reckons with, those of a member are f + d. The members at the ends of all
-intervals are taken one by one. In between, d differs from what interpolates it along an edge of the set by at most what
-it does halfway, if it is a parabola there. Only what leads out of the friction cone counts, and each coordinate adds its
+intervals are taken one by one. In between, d differs from what interpolates it along one coordinate by at most what it
+does halfway, if it is a parabola there. Only what leads out of the friction cone counts, and each coordinate adds its
 own: where nothing has to be added, the members at the ends are all that matters.
 
-In mass and centre of mass, with the inertia about the contact, d is of degree 2 at most in each coordinate. For a set in
-the inertia about the centre of mass it is not; what is added is then taken half as much again, an estimate and no proof.
+In mass and centre of mass, with the inertia about the contact, d is of degree 2 at most in each coordinate, and whether
+it leads out along a coordinate of the centre of mass is the same all over the set. How much is added is taken halfway
+of all intervals, and half as much again: an estimate, not a proof.
 
 Several contacts share a member's wrench as the pseudoinverse does, without squeezing each other. That an admissible
 force exists for every member is thereby guaranteed (weak stability, Pang and Trinkle 2000); that every force that
@@ -18,21 +19,21 @@ from pivoting.controller.kernels.compilation import subroutine
 from pivoting.controller.rotations import cross, into
 
 COORDINATES = 5  # of a member: mass, inertia, and three of the centre of mass
-MORE = 1.5  # times the estimate for sets in the inertia about the CoM
+MORE = 1.5  # times what is found in the middle of the set
 
 
 @subroutine
-def move_cones(R, omega, b, moved, held, wrench_map, unknown, members, apex, floor):  # type: ignore[no-untyped-def]
+def move_cones(R, omega, b, moved, held, wrench_map, unknown, guard):  # type: ignore[no-untyped-def]
     """Write the apexes (V, K, d) and floors (K,) that all members ask for; returns V, and what was added [N].
 
     Args:
         R: (3, 3) object to world.  omega: (3,) world axes [rad/s].  b: (nw,) the required wrench, object axes.
         moved: the values of a `BelievedObject`.  held: `HeldContacts`.  wrench_map: (nw, 6), see `Space`.
-        unknown: the values of a `BelievedSet`, of one world.  members: of `member_scratch`.
-        apex: (32, K, d), of which the first V are written.
+        unknown: the values of a `BelievedSet`, of one world.  guard: a `Guard`.
     """
     masses, com, scales, about_contact, push, spin, axes, spread = unknown
-    place, state, frame, tensor, force, lifted = members
+    apex, floor, place, state, frame = guard.apex, guard.floor, guard.place, guard.state, guard.frame
+    tensor, force, lifted = guard.tensor, guard.force, guard.lifted
     K, dim = held.mu.shape[0], held.force_map.shape[1]
     case = masses, com, scales, about_contact, moved[0], moved[1], held.pivot, axes, spread
     _fill_state(R, omega, b, moved, held, wrench_map, state, frame)
@@ -49,7 +50,7 @@ def move_cones(R, omega, b, moved, held, wrench_map, unknown, members, apex, flo
             for j in range(dim):
                 apex[v, k, j] = -force[k, j]
             floor[k] = max(floor[k], held.f_min[k] - force[k, dim - 1])
-    added = _add_bends(case, state, frame, tensor, place, force, held.mu, V, apex, floor)
+    added = _add_bends(case, state, frame, tensor, place, force, held.mu, apex[:V], floor)
     sway = push + _spun(case, state, spin)
     if sway > 0.0:
         for k in range(K):
@@ -164,8 +165,8 @@ def _fill_tensor(scale, inertia, m, r0, r1, r2, out):  # type: ignore[no-untyped
 
 
 @subroutine
-def _turned_by(I, axes, t0, t1, t2):  # type: ignore[no-untyped-def]
-    """The angular acceleration that a torque makes of an object with inertia I (3, 3) that is free about axes (A, 3)."""
+def _turned_by(I, axes, t0, t1, t2):  # type: ignore[no-untyped-def]  # noqa: E741
+    """The angular acceleration by a torque, of an object with inertia I (3, 3) that is free about axes (A, 3)."""
     if axes.shape[0] == 0:
         return 0.0, 0.0, 0.0
     if axes.shape[0] == 1:
@@ -199,7 +200,7 @@ def _spun(case, state, spin):  # type: ignore[no-untyped-def]
 
 @subroutine
 def _fill_push(place, case, state, frame, tensor, force, lifted):  # type: ignore[no-untyped-def]
-    """Write how much a push of 1 N/kg in any direction changes the forces (K, 2) along and across the contacts, at most.
+    """Write how much a push of 1 N/kg changes the forces along and across the contacts (K, 2) at most.
 
     It acts like gravity: the forces are linear in it, and the changes are bounded by their Frobenius norms.
     """
@@ -222,35 +223,35 @@ def _fill_push(place, case, state, frame, tensor, force, lifted):  # type: ignor
 
 
 @subroutine
-def _add_bends(case, state, frame, tensor, place, force, mu, V, apex, floor):  # type: ignore[no-untyped-def]
-    """Raise all cones and floors by what the forces bend out of them between the vertices; returns the most [N]."""
+def _add_bends(case, state, frame, tensor, place, force, mu, apex, floor):  # type: ignore[no-untyped-def]
+    """Raise all cones and floors by what the forces bend out of them between the vertices; returns the most [N].
+
+    Args:
+        apex: (V, K, d) of the vertices.
+    """
     K, dim = force.shape
-    worst, bit, more = 0.0, 1, 1.0 if case[3] else MORE
+    worst = 0.0
     for k in range(K):
         frame[k, 4, 0] = frame[k, 4, 1] = 0.0
     for i in range(COORDINATES):
         if not _widened(case, i):
             continue
-        for k in range(K):
-            frame[k, 3, 0] = frame[k, 3, 1] = 0.0
-        for v in range(V):
-            if v & bit:
-                continue
-            _place(case, v, i, place)
+        for step in range(3):  # halfway, less what interpolates it there
+            for c in range(COORDINATES):
+                place[c] = 0.5
+            place[i] = 0.5 * step
             _forces(place, case, state, frame, tensor, force)
+            share = 1.0 if step == 1 else -0.5
             for k in range(K):
-                n = force[k, dim - 1] + 0.5 * (apex[v, k, dim - 1] + apex[v | bit, k, dim - 1])
-                t = force[k, 0] + 0.5 * (apex[v, k, 0] + apex[v | bit, k, 0])
-                o = force[k, 1] + 0.5 * (apex[v, k, 1] + apex[v | bit, k, 1]) if dim == 3 else 0.0
-                frame[k, 3, 0] = max(frame[k, 3, 0], np.hypot(t, o) / mu[k] - n)
-                frame[k, 3, 1] = max(frame[k, 3, 1], -n)
+                for j in range(dim):
+                    frame[k, 3, j] = share * force[k, j] + (frame[k, 3, j] if step > 0 else 0.0)
         for k in range(K):
-            frame[k, 4, 0] += more * frame[k, 3, 0]
-            frame[k, 4, 1] += more * frame[k, 3, 1]
-        bit *= 2
+            across = np.hypot(frame[k, 3, 0], frame[k, 3, 1]) if dim == 3 else abs(frame[k, 3, 0])
+            frame[k, 4, 0] += MORE * max(across / mu[k] - frame[k, 3, dim - 1], 0.0)
+            frame[k, 4, 1] += MORE * max(-frame[k, 3, dim - 1], 0.0)
     for k in range(K):
         worst = max(worst, frame[k, 4, 0])
-        for v in range(V):
+        for v in range(apex.shape[0]):
             apex[v, k, dim - 1] += frame[k, 4, 0]
         floor[k] += frame[k, 4, 1]
     return worst

@@ -23,14 +23,13 @@ from pivoting.controller.rotations import cross, into
 
 @subroutine
 def move_planar_cone(R, omega, b, moved, held, wrench_map, unknown, guard):  # type: ignore[no-untyped-def]
-    """Write the apex (1, 1, 2) and floor (1,) of the cone that all members ask for; returns how much too high it may be.
+    """Write apex (1, 1, 2) and floor (1,) of the cone that all members ask for; returns how much too high it may be.
 
     Args:
         R: (3, 3) object to world.  omega: (3,) world axes [rad/s].  b: (3,) the required wrench, object axes.
         moved: the values of a `BelievedObject`.  held: `HeldContacts`.  wrench_map: (3, 6), see `Space`.
-        unknown: the values of a `BelievedSet`, of one world.  guard: of `guard_scratch`.
+        unknown: the values of a `BelievedSet`, of one world.  guard: a `Guard`.
     """
-    _, floor, _, _, corner, ends, apex, _ = guard
     mass, inertia, gravity = moved
     normal = wrench_map[2, 3], wrench_map[2, 4], wrench_map[2, 5]
     t = held.frames[0, 0, 0], held.frames[0, 1, 0], held.frames[0, 2, 0]
@@ -45,9 +44,10 @@ def move_planar_cone(R, omega, b, moved, held, wrench_map, unknown, guard):  # t
     for i in range(3):
         for j in range(3):
             about += normal[i] * inertia[i, j] * normal[j]
-    floor[0], excess = planar_moved_cone(
+    guard.floor[0], excess = planar_moved_cone(
         (normal, t, n), ((F0, F1, F2), b[2]), turning, (mass, about), held.pivot,
-        into(R, gravity[0], gravity[1], gravity[2]), held.mu[0], held.f_min[0], unknown, (corner, ends), apex[0, 0],
+        into(R, gravity[0], gravity[1], gravity[2]), held.mu[0], held.f_min[0], unknown, (guard.corner, guard.ends),
+        guard.apex[0, 0],
     )  # fmt: skip
     return excess
 

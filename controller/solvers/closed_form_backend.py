@@ -4,7 +4,7 @@ import numpy as np
 from pivoting.controller.kernels.guarded_interior_point import guarded_wrench
 from pivoting.controller.kernels.interior_point import contact_wrench
 from pivoting.controller.kernels.planar_closed_form import planar_wrench
-from pivoting.controller.kernels.workspace import guard_scratch, several_workspace, workspace
+from pivoting.controller.kernels.workspace import guard, several_workspace, workspace
 from pivoting.controller.validate import Array
 from pivoting.controller.wrench_problem import WrenchProblem
 
@@ -18,7 +18,7 @@ def closed_form(problem: WrenchProblem) -> tuple[Array, Array, float]:
     data = tuple(np.array(values) for values in stated)
     if problem.several:
         scratch = several_workspace(nw, K, dim, len(problem.apex))
-        residual = guarded_wrench(*data, np.array(problem.apex), f, w, scratch, guard_scratch(nw, K, dim))
+        residual = guarded_wrench(*data, np.array(problem.apex), f, w, scratch, guard(nw, K, dim))
         return w, f, residual
     planar, several = workspace(nw, K, dim)
     kernel, work = (contact_wrench, several) if planar is None else (planar_wrench, planar)

@@ -121,8 +121,8 @@ class Uncertainty:
 
     @property
     def nominal(self) -> Member:
-        """The member in the middle of all intervals."""
-        return self.at([0.5] * self.unknowns)
+        """The member in the middle of all intervals, with the inertia that is believed."""
+        return self.at([0.5] * self.unknowns)._replace(inertia=1.0)
 
     @property
     def unknowns(self) -> int:
@@ -157,6 +157,7 @@ class Uncertainty:
             for each in fields(self)
             if isinstance(getattr(self, each.name), Interval)
         }
+        changed["inertia"] = Interval(*(1.0 + factor * (end - 1.0) for end in self.inertia))
         middle, half = self.com.mean(axis=1), 0.5 * np.ptp(self.com, axis=1)
         com = np.column_stack([middle - factor * half, middle + factor * half])
         return replace(self, **changed, com=com)
@@ -172,8 +173,10 @@ def _positive(name: str, value: ArrayLike, unit: str) -> Interval:
 
 def _about_zero(name: str, value: ArrayLike) -> Interval:
     """An interval with 0 in it; a number stands for the greatest deviation either way."""
-    ends = np.asarray(value)
-    interval = _interval(name, np.array([-ends, ends]) if ends.ndim == 0 else value)
+    if np.ndim(value) == 0:
+        most = number(name, value, at_least=0.0)  # type: ignore[arg-type]
+        return Interval(-most, most)
+    interval = _interval(name, value)
     if not interval.low <= 0.0 <= interval.high:
         raise fail(name, value, "a number >= 0, or an interval (low, high) with 0 in it")
     return interval

@@ -27,9 +27,9 @@ class LawSolver:
         self, controllers: Sequence[WrenchController], bounds: WrenchBounds, correct: tuple[Correct, ...] = ()
     ):
         nw, _ = controllers[0].widths
-        *beliefs, unknown = for_worlds([each.belief for each in controllers])
+        beliefs, unknown = for_worlds([each.belief for each in controllers])
         bounded = tuple(bounds.stacked(nw)) if bounds.any else None
-        self._step = partial(step_worlds, tuple(beliefs), unknown, bounded, *controllers[0].workspace(), TOLERANCE)
+        self._step = partial(step_worlds, beliefs, unknown, bounded, *controllers[0].workspace(), TOLERANCE)
         self._none = np.zeros((1, nw))
         self.correct = correct
 
