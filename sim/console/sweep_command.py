@@ -34,6 +34,7 @@ SAMPLING = ("drawn", "sobol", "lhs", "vertices")  # of sim.sweeping.sampling, wh
 @scenario_options
 @click.option("--out", type=click.Path(path_type=Path), help="A Parquet file, with a row for each world.")
 @click.option("--resume", is_flag=True, help="Go on with the sweep that was begun in that file.")
+@click.option("--chunk", type=click.IntRange(min=1), help="Worlds at once; by default what 250 MB hold.")
 @click.option("--executor", default="local", show_default=True, metavar="local|dask:ADDRESS", help="Where it is run.")
 @click.option(
     "--map", "figure", type=click.Path(path_type=Path), help="Also draw what fails over two keys, a .png file."
@@ -50,6 +51,7 @@ def sweep(
     limits: tuple[str, ...],
     out: Path | None,
     resume: bool,
+    chunk: int | None,
     executor: str,
     figure: Path | None,
     as_json: JsonOutput | None,
@@ -81,6 +83,7 @@ def sweep(
             sampling=sampling,
             out=out,
             resume=resume,
+            chunk=chunk,
             executor=pool,
             progress=report,
         )

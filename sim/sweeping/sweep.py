@@ -61,6 +61,7 @@ def sweep(
     sampling: str = "drawn",
     out: Path | str | None = None,
     resume: bool = False,
+    chunk: int | None = None,
     executor: Executor | None = None,
     progress: Report | None = None,
     **overrides: Any,
@@ -76,6 +77,7 @@ def sweep(
         sampling: of `SAMPLING`: which members of the set the worlds are.
         out: a Parquet file for the rows.
         resume: go on with a sweep that was begun, which gives the rows that it would have given.
+        chunk: how many worlds are run at once, and lost at most by a kill; None: as many as fit into some 250 MB.
         executor: where the chunks are run, of `concurrent.futures` or alike; None: here, one after the other.
         progress: called after each chunk.
         overrides: keys of the scenario.
@@ -90,10 +92,12 @@ def sweep(
     begun = set_up(case, None, worlds=2, seed=seed, first_world=0)
     if begun.world.values is None or case.differing is None:
         raise fail("vary", dict(vary), "at least one key of the object as an interval")
-    if isinstance(worlds, bool) or not isinstance(worlds, int | np.integer) or worlds < 1:
-        raise fail("worlds", worlds, "a whole number >= 1")
+    for key, count in (("worlds", worlds), ("chunk", chunk)):
+        if count is not None and (isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1):
+            raise fail(key, count, "a whole number >= 1")
     sets = {key: case.differing[key] for key in begun.world.values.names}
-    values, size = sampled_values(sets, sampling, int(seed), int(worlds)), max(1, CHUNK // begun.steps)
+    size = max(1, CHUNK // begun.steps) if chunk is None else int(chunk)
+    values = sampled_values(sets, sampling, int(seed), int(worlds))
     firsts = range(0, int(worlds), size)
     tasks = [ChunkTask(case, int(seed), first, values.part(first, size)) for first in firsts]
     if out is None:
