@@ -52,6 +52,11 @@ def test_each_row_leads_back_to_its_world(swept: Swept) -> None:
         swept.replay(30)
 
 
+def test_so_does_one_of_a_set_that_the_controller_is_not_told_of() -> None:
+    hidden = sweep("pivot-2d", 2, {"world.mass": "0.8:1.2", "mu": "0.2:0.4", "world.com": (0.0, 0.01)}, **QUICK)
+    assert hidden.replay(1).scenario.world["mass"] == hidden.rows["world.mass"][1]
+
+
 def test_it_is_kept_chunk_by_chunk(swept: Swept, tmp_path: Path) -> None:
     told: list[SweepProgress] = []
     out = tmp_path / "s.parquet"

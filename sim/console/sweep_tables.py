@@ -51,7 +51,7 @@ def _print_sensitivities(console: Console, swept: Swept) -> None:
     try:
         found = swept.sensitivities()
     except ModuleNotFoundError:
-        console.print("sensitivities need SALib: pip install 'pivoting[sweep]'", style="dim")
+        console.print("sensitivities need SALib: pip install 'pivoting[sweep]'", style="dim", markup=False)
         return
     if not found:
         return
