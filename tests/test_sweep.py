@@ -13,6 +13,7 @@ from click.testing import CliRunner
 from pivoting.controller.uncertainty.uncertainty import Interval
 from pivoting.sim import SweepProgress, Swept, read_sweep, simulate, sweep
 from pivoting.sim.console.command_line import cli
+from pivoting.sim.scenarios.scenario_file import read
 from pivoting.sim.sweeping.failure_map import draw_map
 from pivoting.sim.sweeping.sampling import SAMPLING, sampled_values
 
@@ -132,8 +133,9 @@ def test_a_sweep_that_is_killed_is_resumed(swept: Swept, tmp_path: Path) -> None
 
 
 def test_the_command(swept: Swept, tmp_path: Path) -> None:
-    out, picture = tmp_path / "s.parquet", tmp_path / "map.png"
-    done = CliRunner().invoke(cli, [*WORDS, "--out", str(out), "--map", str(picture)], standalone_mode=False)
+    out, picture, worst = (tmp_path / name for name in ("s.parquet", "map.png", "worst.json"))
+    files = ["--out", str(out), "--map", str(picture), "--worst", str(worst)]
+    done = CliRunner().invoke(cli, [*WORDS, *files], standalone_mode=False)
     assert done.exception is None, done.exception
     assert done.return_value == (1 if len(swept.failed) else 0)
     assert f"failed: {len(swept.failed)} of 30 worlds (drawn)" in done.output
@@ -141,6 +143,9 @@ def test_the_command(swept: Swept, tmp_path: Path) -> None:
     assert "30 done" in done.output
     assert_same_rows(read_sweep(out), swept)
     assert picture.exists()
+    file = read(worst)
+    alone = simulate(file.scenario, file.worlds, file.seed, first_world=file.first_world)
+    assert alone.measures.slip_max_m[0] == swept.rows["slip_max_m"][swept.worst]
     for wrong, message in (("dusk", "must be local, or dask:"), ("dask:", "must be local, or dask:")):
         done = CliRunner().invoke(cli, [*WORDS, "--executor", wrong], standalone_mode=False)
         assert message in str(done.exception)

@@ -1,5 +1,6 @@
 """The command `pivoting sweep`: thousands of worlds that differ, on this machine or a cluster, kept in one file."""
 
+import json
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ from pivoting.sim.console.stdout import JsonOutput, console, json_option
 
 if TYPE_CHECKING:
     from pivoting.sim.sweeping.sweep import Report, SweepProgress
+    from pivoting.sim.sweeping.swept import Swept
 
 SAMPLING = ("drawn", "sobol", "lhs", "vertices")  # of sim.sweeping.sampling, which imports what takes long
 
@@ -39,6 +41,7 @@ SAMPLING = ("drawn", "sobol", "lhs", "vertices")  # of sim.sweeping.sampling, wh
 @click.option(
     "--map", "figure", type=click.Path(path_type=Path), help="Also draw what fails over two keys, a .png file."
 )
+@click.option("--worst", type=click.Path(path_type=Path), help="Also write the worst world's scenario, a .json file.")
 @json_option("Print the summary as one JSON object and nothing else.")
 def sweep(
     scenario: str | None,
@@ -54,13 +57,15 @@ def sweep(
     chunk: int | None,
     executor: str,
     figure: Path | None,
+    worst: Path | None,
     as_json: JsonOutput | None,
     **own: Any,
 ) -> int:
     """Run many worlds of SCENARIO that differ in what is not known of the object; exit 0 if all of them pass.
 
     Each is measured as it runs, and what is kept of it is a row. A sweep that was killed is gone on with by --resume,
-    to the same rows. A world is run again alone by what its row says, see pivoting.read_sweep.
+    to the same rows. A world is run again alone by what its row says: pivoting.read_sweep, or --worst FILE and then
+    pivoting run --scenario FILE --out FOLDER.
     """
     from pivoting.sim.console.asked_run import ask
     from pivoting.sim.console.json_values import jsonable
@@ -89,13 +94,24 @@ def sweep(
         )
     if figure is not None:
         draw_map(swept, figure)
+    if worst is not None:
+        _write_worst(swept, worst)
     if as_json:
         as_json(jsonable(swept.summary()))
     else:
         print_swept(console(), swept)
-        for path in filter(None, (out, figure)):
+        for path in filter(None, (out, figure, worst)):
             click.echo(f"wrote {path}")
     return 1 if len(swept.failed) else 0
+
+
+def _write_worst(swept: "Swept", path: Path) -> None:
+    """Write the scenario of the worst world alone, as `pivoting run --scenario` takes it."""
+    from pivoting.sim.scenarios.scenario_file import written
+    from pivoting.sim.whole_files import whole
+
+    with whole(path) as part:
+        part.write_text(json.dumps(written(swept.file_of(swept.worst)), indent=1) + "\n", encoding="utf-8")
 
 
 @contextmanager
@@ -112,7 +128,12 @@ def _executor(asked: str) -> Iterator[Executor | None]:
     except ModuleNotFoundError:
         told = "a sweep on Dask needs distributed, which is not installed: pip install 'pivoting[sweep]'"
         raise click.ClickException(told) from None
-    with Client(address, timeout=10) as client:
+    try:
+        client = Client(address, timeout=10)
+    except (OSError, ValueError) as error:
+        told = f"must be the address of a Dask scheduler that answers ({' '.join(str(error).split())})"
+        raise click.BadParameter(f"--executor {asked!r}: {told}") from None
+    with client:
         yield client.get_executor(pure=False)
 
 

@@ -36,7 +36,7 @@ class PartFiles:
         self._out, self._folder = out, out.with_name(f".{out.name}.parts")
         self._plan = json.loads(json.dumps(plan))
         begun = self._folder / _PLAN
-        if begun.exists():
+        if begun.exists() and any(self._folder.glob("part-*.parquet")):
             _refuse_another(begun, json.loads(begun.read_text(encoding="utf-8")), self._plan, resume)
             return
         if resume and out.exists():

@@ -10,6 +10,7 @@ from pivoting.sim.fleet import ReplayError
 from pivoting.sim.judging.measures import Measures
 from pivoting.sim.run import Run
 from pivoting.sim.scenarios.scenario import Scenario
+from pivoting.sim.scenarios.scenario_file import ScenarioFile
 from pivoting.sim.sweeping.chunk_task import Rows
 
 if TYPE_CHECKING:
@@ -63,6 +64,24 @@ class Swept:
         test = binomtest(len(self.failed), self.worlds, alternative="less")
         return float(test.proportion_ci(CONFIDENCE, method="exact").high)
 
+    @property
+    def worst(self) -> int:
+        """The number of the world, of those that failed if any did, whose contact slipped farthest."""
+        slip = self.rows["slip_max_m"].astype(float)
+        some = self.failed if len(self.failed) else np.arange(self.worlds)
+        return int(some[np.argmax(np.where(np.isnan(slip[some]), np.inf, slip[some]))])
+
+    def file_of(self, world: int) -> ScenarioFile:
+        """What the file of one world alone says, with which `pivoting run --scenario` runs and records it.
+
+        Raises:
+            ValueError: there is no such world.
+        """
+        if isinstance(world, bool) or not isinstance(world, int | np.integer) or not 0 <= world < self.worlds:
+            raise fail("world", world, f"a whole number in [0, {self.worlds})")
+        own = {name: float(self.rows[name][world]) for name in self.rows if name.startswith("world.")}
+        return ScenarioFile(self.scenario.change(**own), 1, self.seed, int(world))
+
     def replay(self, world: int) -> Run:
         """One world again, alone and in full, from its row; that it is the same to the last bit is checked.
 
@@ -72,10 +91,8 @@ class Swept:
         """
         from pivoting.sim.simulation import simulate
 
-        if isinstance(world, bool) or not isinstance(world, int | np.integer) or not 0 <= world < self.worlds:
-            raise fail("world", world, f"a whole number in [0, {self.worlds})")
-        own: dict[str, Any] = {name: float(self.rows[name][world]) for name in self.rows if name.startswith("world.")}
-        run = simulate(self.scenario, 1, self.seed, first_world=int(world), **own)
+        alone = self.file_of(world)
+        run = simulate(alone.scenario, 1, alone.seed, first_world=alone.first_world)
         for name in Measures.__dataclass_fields__:
             now, then = float(getattr(run.measures, name)[0]), float(self.rows[name][world])
             if not np.array_equal(now, then, equal_nan=True):
