@@ -9,7 +9,7 @@ TESTS := -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 UV := .venv-lock/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
 	--custom-compile-command "make lock"
 
-.PHONY: help demo test check docs latest bench evidence study engines objects figures lock clean
+.PHONY: help demo test check docs latest bench evidence kills study engines objects figures lock clean
 
 demo: $(STAMP)  ## the worked example, a block pivoted in MuJoCo, its verdict, a recording and a picture in out/
 	@mkdir -p out
@@ -50,6 +50,10 @@ evidence: $(STAMP)  ## random problems by the hundred thousand, 256 worlds of ev
 study: $(STAMP)  ## how fast each formulation can pivot, and what a horizon saves
 	$(BIN)/python benchmarks/bench_formulations.py --json benchmarks/results/formulations.json
 	$(BIN)/python benchmarks/bench_effort.py --json benchmarks/results/effort.json
+
+# Each takes a few seconds, so not in `make test`.
+kills: $(STAMP)  ## sweeps that are killed at 20 random moments and resumed: no row is lost, doubled or changed
+	$(BIN)/python benchmarks/kill_sweeps.py --json benchmarks/results/kills.json
 
 engines: .venv/.peers  ## the same closed loops in Drake, of the extra [bench]
 	$(BIN)/python benchmarks/engines.py --json benchmarks/results/engines.json

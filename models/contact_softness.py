@@ -105,7 +105,7 @@ def read_rows(model: mujoco.MjModel, body: int, support: int, placements: Iterab
     if not found:
         return None
     first, unknown = found[0], _unknown(model, body)
-    for other in found:
+    for other in found[1:]:
         if not all(np.allclose(a, b, rtol=1e-6, atol=1e-12) for a, b in zip(first.law, other.law, strict=True)):
             unknown = unknown or "the contacts of its geoms differ in their parameters"
     mu = np.min([row.mu for row in found], axis=0)

@@ -13,5 +13,6 @@ from .sim.saved_run import load as load
 from .sim.scenarios.scenario import Scenario as Scenario
 from .sim.scenarios.shipped_scenarios import own_object as own_object, scenario as scenario
 from .sim.simulation import simulate as simulate
+from .sim.sweeping.sweep import read_sweep as read_sweep, sweep as sweep
 
 __version__: str

@@ -8,3 +8,5 @@ from .saved_run import load as load
 from .scenarios.scenario import Scenario as Scenario
 from .scenarios.shipped_scenarios import SCENARIOS as SCENARIOS, own_object as own_object, scenario as scenario
 from .simulation import simulate as simulate
+from .sweeping.sweep import SweepProgress as SweepProgress, read_sweep as read_sweep, sweep as sweep
+from .sweeping.swept import Swept as Swept

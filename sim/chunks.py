@@ -38,7 +38,7 @@ def run_in_chunks(begun: Begun, handed: Handed, keep: str, progress: Report | No
         for first in range(0, worlds, size):
             part = begun.part(first, min(size, worlds - first))
             kept.add(run_worlds(part, handed, _report(progress, part, first, worlds * steps), nullcontext([])), first)
-            _give_back()
+            give_back()
     fleet = kept.fleet(begun, handed, tuple(warned))
     if not fleet.failed_worlds.size:
         return fleet
@@ -49,7 +49,7 @@ def run_in_chunks(begun: Begun, handed: Handed, keep: str, progress: Report | No
     return replace(fleet, findings=found)
 
 
-def _give_back() -> None:
+def give_back() -> None:
     """Have glibc return what a chunk has freed: it keeps it in pieces that the next may not fit into, ever more."""
     with suppress(AttributeError, OSError, TypeError):  # another C library, which has no such function
         ctypes.CDLL(None).malloc_trim(0)

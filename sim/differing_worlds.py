@@ -80,7 +80,10 @@ class DifferingWorlds:
 
     def part(self, first: int, worlds: int) -> "DifferingWorlds":
         """Some of them, from that with the index `first` on."""
-        return replace(self, values=self.values.part(first, worlds))
+        some = replace(self, values=self.values.part(first, worlds))
+        if "truths" in vars(self):  # which takes long enough to be read once
+            vars(some)["truths"] = self.truths[first : first + worlds]
+        return some
 
     def models(self) -> Iterator[mujoco.MjModel]:
         """The model of each world in turn, which is the same object with other values each time."""

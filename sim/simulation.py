@@ -135,6 +135,7 @@ def run_worlds(
     decided = _decided(begun, handed, open_loop)
     bounds = _lanes(begun.setting.worlds) if _plain(decided, handed) else [(0, begun.setting.worlds)]
     log, lanes, starts = new_log(begun, decided), [], []
+    begun.world.read()
     for first, last in bounds:
         part = begun.part(first, last - first)
         own = decided if len(bounds) == 1 else _decided(part, handed, open_loop)

@@ -100,6 +100,10 @@ class World:
             return (Truth.of(self.truth, self.applied_at, self.mu, self.contact_rows),)
         return self.differing.truths
 
+    def read(self) -> None:
+        """Read what each world has of its own now, once for all parts that are then made."""
+        self.truths  # noqa: B018
+
     @cached_property
     def offsets(self) -> Array | None:
         """(W or 1, 3) from the CoM to where the wrench acts, object axes [m]; None where that is the CoM."""
@@ -121,6 +125,11 @@ class World:
             return self
         differing = None if self.differing is None else self.differing.part(first, worlds)
         return replace(self, values=self.values.part(first, worlds), differing=differing)
+
+    def with_values(self, values: WorldValues) -> "World":
+        """The same scene, of worlds that have these values of the same keys."""
+        assert self.differing is not None, "worlds differ in these keys"
+        return replace(self, values=values, differing=replace(self.differing, values=values))
 
     def of(self, world: int) -> "World":
         """One of the worlds, as it is alone."""

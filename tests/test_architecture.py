@@ -11,7 +11,10 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 ROOMS = {"controller": {"controller"}, "models": {"models"}, "sim": {"controller", "models", "sim"}}
-OPTIONAL, EXTRAS = "optional-dependencies", ("data", "video", "view")  # which users install who need what they are for
+OPTIONAL, EXTRAS = (
+    "optional-dependencies",
+    ("data", "video", "view", "sweep"),
+)  # which users install who need what they are for
 FILES = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 FILES += sorted((ROOT / "pivoting").glob("*.py"))  # the front of all rooms
 SHARED = {"compile_hooks", "errors"}  # of the front, for every room: they import nothing

@@ -1,4 +1,4 @@
-"""The command line: `pivoting example | list | contacts | run | render | view`.
+"""The command line: `pivoting example | list | contacts | run | sweep | render | view`.
 
 Exit 0: pass, 1: fail, 2: one line of why.
 """
@@ -15,6 +15,7 @@ from pivoting import __version__
 from pivoting.errors import PivotingError
 from pivoting.sim.console.scenario_options import scenario_options
 from pivoting.sim.console.stdout import JsonOutput, console, json_option
+from pivoting.sim.console.sweep_command import sweep
 from pivoting.sim.keep import KEEP
 
 # What one command alone needs, as rerun and matplotlib, is imported by that.
@@ -24,6 +25,9 @@ from pivoting.sim.keep import KEEP
 @click.version_option(__version__, message="pivoting %(version)s")
 def cli() -> None:
     """The smallest wrench that balances or pivots an object on a frictional contact, proved in MuJoCo."""
+
+
+cli.add_command(sweep)
 
 
 @cli.command()

@@ -143,10 +143,14 @@ def _reasons(case: _Case, strays: list[str]) -> Iterator[str]:
     if case.failed("angle_error_rms_deg") or case.failed("angle_error_max_deg"):
         yield f"the angle was off by up to {float(run.measures.angle_error_max_deg[i]):.3g} deg"
     if case.failed("force_mismatch_rel"):
-        yield (
-            f"the contact force was not the predicted one ({100.0 * float(run.measures.force_mismatch_rel[i]):.3g} %):"
-            " the world is not as it is believed to be, or its contact does not hold still"
-        )
+        off = f"({100.0 * float(run.measures.force_mismatch_rel[i]):.3g} %)"
+        if run.scenario.uncertain:
+            yield f"the contact force was not the one with which the object would stick {off}"
+        else:
+            yield (
+                f"the contact force was not the predicted one {off}:"
+                " the world is not as it is believed to be, or its contact does not hold still"
+            )
     if case.failed("unsolved_steps"):
         yield f"{float(run.measures.unsolved_steps[i]):.0f} steps had no certified answer"
     if case.failed("penetration_rel"):

@@ -91,7 +91,7 @@ def _mismatch(run: "ContactMotion", steps: NDArray[np.bool_]) -> Array:
 
     But for those in which a body has landed on contacts that no stance holds: it shares the load with them.
     """
-    force = expected_force(run) if run.scenario.in_sets and run.certified else run.force
+    force = expected_force(run) if run.scenario.uncertain and run.certified else run.force
     off = np.linalg.norm(run.force_measured - force, axis=-1)
     size = np.linalg.norm(force, axis=-1)
     if not run.scenario.limits.contacts_end or run.stance is not None:
@@ -102,7 +102,7 @@ def _mismatch(run: "ContactMotion", steps: NDArray[np.bool_]) -> Array:
 
 def _penetration(run: "ContactMotion") -> Array:
     """(W,) greatest depth [m] beyond that at which the soft contact balances the load."""
-    predicted = run.certified and not run.scenario.in_sets  # of a set each member has another load
+    predicted = run.certified and not run.scenario.uncertain  # of a set each member has another load
     load = (run.force if predicted else run.force_measured)[..., -1].sum(axis=-1)
     return np.maximum(run.log.contacts.depth - run.world.depths(np.nan_to_num(load)), 0.0).max(axis=1)
 

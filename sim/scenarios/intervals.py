@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 from pivoting.controller.uncertainty.uncertainty import Interval
 from pivoting.controller.validate import fail
 
@@ -15,7 +16,7 @@ def read_interval(name: str, value: Any) -> Any:
         ValueError: the ends are no numbers, or LOW is more than HIGH; it is named.
     """
     ends = value.split(":") if isinstance(value, str) and ":" in value else value
-    if not isinstance(ends, list | tuple) or isinstance(value, Interval):
+    if not isinstance(ends, list | tuple | np.ndarray) or isinstance(value, Interval):
         return value
     try:
         low, high = (float(end) for end in ends)

@@ -140,9 +140,9 @@ class Scenario(ScenarioKeys):
         return differing_values(self) or None
 
     @property
-    def in_sets(self) -> bool:
-        """Whether anything of the object is an interval, to the controller or in the world."""
-        return any(isinstance(value, Interval) for value in (*believed_values(self).values(), *self.world.values()))
+    def uncertain(self) -> bool:
+        """Whether the controller is told that something of the object is in an interval, and knows no number."""
+        return any(isinstance(value, Interval) for value in believed_values(self).values())
 
     @property
     def reference_keys(self) -> tuple[str, ...]:

@@ -130,10 +130,19 @@ def read(path: Path) -> ScenarioFile:
     except ValueError as error:
         raise InputError(f"{path}: must be a scenario in JSON, whole ({error})") from None
     try:
-        _check(said)
-        case = None if "scenario" in said.get("python_objects", ()) else _scenario(said, path.parent)
+        return described(said, path.parent)
     except ValueError as error:
         raise InputError(f"{path}: {error}") from None
+
+
+def described(said: Any, folder: Path) -> ScenarioFile:
+    """What was said of a scenario in a file in this folder.
+
+    Raises:
+        ValueError: it is none, or one of a later version.
+    """
+    _check(said)
+    case = None if "scenario" in said.get("python_objects", ()) else _scenario(said, folder)
     known = {each.name for each in fields(ScenarioFile)} & set(said)
     kept = {name: said[name] for name in known}
     return ScenarioFile(case, **{**kept, "python_objects": tuple(kept.get("python_objects", ()))})
