@@ -1,4 +1,4 @@
-"""The steps of a closed loop: sense, observe, control, actuate, apply, step; and what each of them gives is logged."""
+"""The steps of a closed loop: sense, observe, control, actuate, apply, disturb, step; all of it is logged."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
@@ -74,6 +74,8 @@ class Steps:
             before = answer.wrench
             acting, column = (values, nw) if not stages.actuate else (_acting(k, before, stages, log), 0)
             apply(states, acting, column, log.wrench_world[k])
+            if stages.disturb:
+                _disturb(k, stages, apply, log)
             plant.step()
             block[k - first] = plant.sensed
             if k + 1 - first == len(block) or k + 1 == last:
@@ -146,3 +148,13 @@ def _acting(k: int, wrench: Array, stages: Stages, log: Log) -> Array:
     assert log.acting is not None
     log.acting[k] = wrench
     return wrench
+
+
+def _disturb(k: int, stages: Stages, apply: FreeWrench, log: Log) -> None:
+    """Whatever else happens in a step."""
+    assert log.disturbance is not None
+    for disturb in stages.disturb:
+        added = disturb(k)
+        if added is not None:
+            apply.add(added)
+            log.disturbance[k] += added
