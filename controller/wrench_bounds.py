@@ -112,6 +112,23 @@ class WrenchBounds:
         fill_excess(self.stacked(nw), wrench.reshape(-1, nw), last.reshape(-1, nw), dt, out)
         return float(out.max(initial=-1.0))
 
+    def within(self, wrench: Array, before: Array | None, dt: float) -> Array:
+        """Wrenches (W, nw) as an actuator makes them that stops at its bounds: the nearest, one bound after another.
+
+        Args:
+            before: (W, nw) that acted `dt` [s] earlier, within the bounds; None leaves the bounds on rates out.
+        """
+        balls = self.balls(wrench.shape[1])
+        acting = wrench.copy()
+        for ball in sorted(balls, key=lambda ball: not ball.rate):  # nearer to 0 is nearer to what is within, too
+            if ball.rate and before is None:
+                continue
+            most, since = (ball.radius * dt, before) if ball.rate else (ball.radius, 0.0)
+            part = (acting - since) @ ball.rows.T
+            size = np.linalg.norm(part, axis=1, keepdims=True)
+            acting -= (part - part * np.minimum(1.0, most / np.maximum(size, 1e-300))) @ ball.rows
+        return acting
+
 
 @kernel
 def fill_excess(stacked, wrench, before, dt, out):  # type: ignore[no-untyped-def]

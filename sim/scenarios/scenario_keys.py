@@ -7,6 +7,7 @@ from pivoting.controller.planning.integrators import INTEGRATORS
 from pivoting.controller.references import REFERENCES, Reference
 from pivoting.models.mujoco_constants import LEAST_FRICTION
 from pivoting.sim.scenarios.key_declaration import Needs, declared_keys, key
+from pivoting.sim.scenarios.loop_keys import LoopKeys
 
 LOWEST = 0.1  # [deg] from a face: closer, the next corner touches the table too
 ANY_ANGLE = {"at_least": -360.0, "at_most": 360.0}  # [deg] of an object whose plan knows what its shape allows
@@ -34,8 +35,8 @@ _PLANS, _PLANS_OR_PLAYS = Needs("plan_hz"), Needs("plan_hz", open_loop=True)
 
 
 @dataclass(frozen=True, kw_only=True)
-class ScenarioKeys:
-    """The values of a scenario that `--set` changes. Angles are in degrees here and in radians everywhere else."""
+class IdealKeys:
+    """The values of a scenario that `--set` changes, as far as they belong to a loop in which nothing fails."""
 
     mu: float | None = key(
         None,
@@ -232,16 +233,6 @@ class ScenarioKeys:
         needs=_PLANS_OR_PLAYS,
     )
 
-    noise: float = key(
-        0.0,
-        "greatest error of the measured orientation about each axis, drawn anew in each step",
-        group=STAGES,
-        unit="deg",
-        at_least=0.0,
-        at_most=10.0,
-        stage="pivoting.sim.pipeline.measurement_noise:MeasurementNoise",
-    )
-
     integral: float = key(
         0.0,
         "rate at which integral action removes a steady error of the angle",
@@ -278,6 +269,11 @@ class ScenarioKeys:
         None, "ratio of the contact's impedance along the support to that across it",
         group=SIMULATOR, above=0.0, at_most=1e9, none=SCENE,
     )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScenarioKeys(LoopKeys, IdealKeys):
+    """The values of a scenario that `--set` changes. Angles are in degrees here and in radians everywhere else."""
 
 
 KEYS = declared_keys(ScenarioKeys)
