@@ -24,6 +24,7 @@ _PIPELINE = "pivoting.sim.pipeline"
 _NOISE = Needs("noise", instead=("noise_position",))
 _FAULTS = Needs("repeated", instead=("dropped", "broken", "solver_failure"))
 _CHECK = f"{_PIPELINE}.measurement_check:MeasurementCheck"
+_FREE = f"{_PIPELINE}.free_reference:FreeReference"
 _RESOLUTION = f"{_PIPELINE}.wrench_resolution:WrenchResolution"
 _ACTUATOR = f"{_PIPELINE}.limited_actuator:LimitedActuator"
 
@@ -140,7 +141,7 @@ class LoopKeys:
         unit="rad/s",
         at_least=0.0,
         at_most=1e5,
-        stage=(_CHECK, f"{_PIPELINE}.model_observer:ModelObserver"),
+        stage=(_CHECK, f"{_PIPELINE}.model_observer:ModelObserver", _FREE),
     )
     differentiator: float = key(
         0.0,
