@@ -67,7 +67,7 @@ class PoseObserver:
         self._covariance = self._step @ self._covariance @ self._step.T + self._walk
 
     def correct(self, values: Array, fresh: NDArray[np.bool_]) -> None:
-        """Take up measured poses, in the first columns of values (W, 7 or more), of the worlds in which they are new."""
+        """Take up measured poses, in the first columns of values (W, 7 or more), where they are `fresh` (W,)."""
         now, P = self.states, self._covariance
         gain = np.where(fresh[:, None], P[:, :, 0] / (P[:, :1, 0] + 1.0), 0.0)
         slow = np.where(fresh[:, None], self._slow, 0.0)

@@ -136,7 +136,7 @@ def exponential(vector: Array) -> Array:
 
 
 def rotation_vector(quaternion: Array) -> Array:
-    """The rotation vectors (..., 3) [rad] of unit quaternions (..., 4), the shorter way round: inverts `exponential`."""
+    """The rotation vectors (..., 3) [rad] of unit quaternions (..., 4), the shorter way round."""
     shorter = quaternion * np.where(quaternion[..., :1] < 0.0, -1.0, 1.0)
     sine = np.linalg.norm(shorter[..., 1:], axis=-1, keepdims=True)
     scale = 2.0 * np.arctan2(sine, shorter[..., :1]) / np.where(sine > 0.0, sine, 1.0)

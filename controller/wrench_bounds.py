@@ -118,16 +118,18 @@ class WrenchBounds:
         Args:
             before: (W, nw) that acted `dt` [s] earlier, within the bounds; None leaves the bounds on rates out.
         """
-        balls = self.balls(wrench.shape[1])
-        acting = wrench.copy()
-        for ball in sorted(balls, key=lambda ball: not ball.rate):  # nearer to 0 is nearer to what is within, too
-            if ball.rate and before is None:
+        acting, still = wrench.copy(), np.zeros_like(wrench)
+        for ball in sorted(self.balls(wrench.shape[1]), key=lambda ball: not ball.rate):
+            if not ball.rate:
+                most, since = ball.radius, still
+            elif before is not None:
+                most, since = ball.radius * dt, before
+            else:
                 continue
-            most, since = (ball.radius * dt, before) if ball.rate else (ball.radius, 0.0)
             part = (acting - since) @ ball.rows.T
             size = np.linalg.norm(part, axis=1, keepdims=True)
             acting -= (part - part * np.minimum(1.0, most / np.maximum(size, 1e-300))) @ ball.rows
-        return acting
+        return acting  # what is scaled back towards 0 stays near to `before`, which is within the bounds
 
 
 @kernel

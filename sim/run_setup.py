@@ -70,9 +70,7 @@ class Begun(NamedTuple):
         """The same for some of the worlds, from that with the index `first` on."""
         setting = self.setting
         belief = self.belief.part(first, worlds)
-        some = setting._replace(
-            worlds=worlds, first_world=setting.first_world + first, controllers=belief.controllers
-        )
+        some = setting._replace(worlds=worlds, first_world=setting.first_world + first, controllers=belief.controllers)
         return self._replace(setting=some, belief=belief)
 
 
@@ -96,9 +94,7 @@ def set_up(
     world = build_world(case, belief.scene, scene, belief.placement)
     turning = -matrix(belief.placement.body.table)[:, 1:2].T if belief.placement.body.dim == 2 else np.eye(3)
     counts = int(seed), int(worlds), int(first_world)
-    setting = Setting(
-        *counts, world.dt, turning, belief.attached.controller.law, case, belief.controllers, world.unit
-    )
+    setting = Setting(*counts, world.dt, turning, belief.attached.controller.law, case, belief.controllers, world.unit)
     timed = _timed(case, belief, world)
     return Begun(asked, case, belief, world, *timed, setting)
 

@@ -33,7 +33,7 @@ def predict_worlds(beliefs, axes, wrenches, added, dt, scratch, states):  # type
     for i in range(states.shape[0]):
         believed = belief_of(beliefs, i if each > 1 else 0)
         belief = Belief(believed.object, believed.contacts, believed.source, MOVING)
-        mass, inertia, _ = belief.object
+        mass = belief.object.mass
         q, omega, e = states[i, 3:7], states[i, 10:13], axes[i if axes.shape[0] > 1 else 0]
         fill_rotation(q, R)
         fill_required(R, q, omega, q, omega, still, belief, b)

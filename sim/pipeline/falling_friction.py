@@ -54,9 +54,12 @@ def falls_at(case: Scenario, dt: float) -> int:
     return round((0.5 * case.duration if case.mu_falls_at is None else case.mu_falls_at) / dt)
 
 
-def friction_at(case: Scenario, mu: float, steps: int, dt: float) -> Array:
-    """(N,) the world's friction coefficient in each of its steps, which is `mu` at first; `case`: `absolute`."""
-    friction = np.full(steps, mu)
-    if case.mu_falls_to is not None:
-        friction[falls_at(case, dt) :] = case.mu_falls_to
-    return friction
+def friction_at(case: Scenario, mu: float, times: Array, dt: float) -> Array:
+    """(N,) the world's friction coefficient in the steps that begin at `times` (N,) [s], which is `mu` at first.
+
+    Args:
+        case: `absolute`.
+    """
+    if case.mu_falls_to is None:
+        return np.full(len(times), mu)
+    return np.where(times > (falls_at(case, dt) - 0.5) * dt, case.mu_falls_to, mu)

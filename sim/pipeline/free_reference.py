@@ -1,4 +1,4 @@
-"""Feedback about those axes alone that the contacts leave free: about the others nothing but noise could be corrected."""
+"""Feedback about the axes alone that the contacts leave free: about the others there is only noise to be corrected."""
 
 import numpy as np
 from numpy.typing import NDArray

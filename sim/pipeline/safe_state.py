@@ -45,9 +45,9 @@ class SafeState:
         for name in ("measure_hz", "control_hz"):
             rate = getattr(case, name)
             if rate is not None and patience < 1.0 / rate + dt:
-                raise fail("safe_after", patience, f"more than the {1.0 / rate:g} s between two of {name}")
+                raise fail("safe_after", patience, f">= {1.0 / rate + dt:g} s, a time step more than {name} takes")
         if patience < case.delay + dt:
-            raise fail("safe_after", patience, f"more than the delay of {case.delay:g} s")
+            raise fail("safe_after", patience, f">= {case.delay + dt:g} s, a time step more than the delay")
         self.setting, self.steps = setting, setting.step("safe_after", patience)
         self.angle = float(np.deg2rad(case.safe_angle))
         self.told = f"{patience:g} s", f"{case.safe_angle:g} deg"

@@ -42,7 +42,7 @@ class _Held:
         if k % self._every == 0:
             self._inner(k, states, before, out)
             self._values, self._status = out.values.copy(), out.status.copy()
-            self._answered = np.isfinite(out.wrench).all(axis=1)
+            self._answered = np.asarray(np.isfinite(out.wrench).all(axis=1))
             return
         out.values[:] = self._values
         out.residual[:] = np.nan

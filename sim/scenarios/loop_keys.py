@@ -51,9 +51,7 @@ class LoopKeys:
         at_most=1e3,
         stage=f"{_PIPELINE}.position_noise:PositionNoise",
     )
-    noise_distribution: str = key(
-        "uniform", "distribution of both", group=MEASURED, words=DISTRIBUTIONS, needs=_NOISE
-    )
+    noise_distribution: str = key("uniform", "distribution of both", group=MEASURED, words=DISTRIBUTIONS, needs=_NOISE)
     bias: float = key(
         0.0,
         "error of the measured orientation that stays the same, its direction drawn for each world",
