@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from pivoting.controller.belief import for_worlds
-from pivoting.controller.kernels.pivot_prediction import predict_worlds
+from pivoting.controller.kernels.pivot_prediction import correct_worlds, fill_contacts, predict_worlds
 from pivoting.controller.mobility import free_axes
 from pivoting.controller.rotations import rotated
 from pivoting.controller.validate import Array
@@ -32,6 +33,7 @@ class PivotModel:
             [free_axes(belief.contacts.points, belief.contacts.pivot, belief.source.map) for belief in beliefs]
         )
         sizes = (3, 3), (nw,), (3, nw), (3, nw), (3, 4), (3,), (3,), (4,)
+        self._spin = np.zeros(6)
         self._scratch = tuple(np.zeros(size) for size in sizes)
 
     def advance(self, states: Array, wrenches: Array, added: Array) -> None:
@@ -48,7 +50,16 @@ class PivotModel:
         axes = rotated(orientation[:, None], np.broadcast_to(self.axes, (len(vectors), *self.axes.shape[1:])))
         return np.einsum("waj,wak,wk->wj", axes, axes, vectors)
 
-    def arm(self, orientation: Array) -> Array:
-        """(W, 3) from the contacts' mean to the centre of mass at orientations (W, 4), world axes [m]."""
-        pivot = np.broadcast_to(self._pivot, (len(orientation), 3))
-        return -rotated(orientation, pivot) - self._offset
+    def correct(
+        self, slow: float, measured: Array, fresh: NDArray[np.bool_], states: Array, unknown: Array, covariance: Array
+    ) -> None:
+        """Correct states in place by measured poses, see `correct_worlds`."""
+        correct_worlds(
+            self.axes, self._pivot, self._offset, slow, measured, fresh, self._spin, states, unknown, covariance
+        )
+
+    def contacts(self, states: Array) -> Array:
+        """(W, 3) where the mean of the contacts is by the poses of states (W, 13), world axes [m]."""
+        out = np.empty((len(states), 3))
+        fill_contacts(self._pivot, self._offset, states, out)
+        return out

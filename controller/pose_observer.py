@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.kernels.compiled_step import STATE
 from pivoting.controller.pivot_model import PivotModel
-from pivoting.controller.rotations import CONJUGATE, exponential, quaternion_product, rotation_vector
 from pivoting.controller.validate import Array, fail, number
 from pivoting.controller.wrench_controller import WrenchController
 from scipy.linalg import solve_discrete_are
@@ -68,23 +67,11 @@ class PoseObserver:
 
     def correct(self, values: Array, fresh: NDArray[np.bool_]) -> None:
         """Take up measured poses, in the first columns of values (W, 7 or more), where they are `fresh` (W,)."""
-        now, P = self.states, self._covariance
-        gain = np.where(fresh[:, None], P[:, :, 0] / (P[:, :1, 0] + 1.0), 0.0)
-        slow = np.where(fresh[:, None], self._slow, 0.0)
-        position, orientation = now[:, :3], now[:, 3:7]
-        seen = np.where(fresh[:, None], values[:, :7], now[:, :7])  # what is not new may be no number
-        off = rotation_vector(quaternion_product(seen[:, 3:7], orientation * CONJUGATE))
-        free = self.model.free(orientation, off)
-        contact = position - self.model.arm(orientation)
-        turned = quaternion_product(exponential(gain[:, :1] * free + slow * (off - free)), orientation)
-        orientation[:] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
-        arm = self.model.arm(orientation)
-        position[:] = contact + arm
-        position += slow * (seen[:, :3] - position)
-        now[:, 10:13] += gain[:, 1:2] * free
-        now[:, 7:10] = np.cross(now[:, 10:13], arm)
-        self.unknown += gain[:, 2:3] * free
-        self._covariance = P - gain[:, :, None] * P[:, :1]
+        seen, new = (
+            np.array(values),
+            np.array(fresh),
+        )  # copies that may be written: else numba compiles a second variant
+        self.model.correct(self._slow, seen, new, self.states, self.unknown, self._covariance)
 
     def ahead(self, wrenches: Sequence[Array]) -> Array:
         """(W, 13) the estimate as it will be after some steps in which these wrenches act, one after another."""

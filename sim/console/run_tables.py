@@ -134,11 +134,11 @@ def _print_notes(console: Console, run: Experiment, summary: Mapping[str, Any]) 
         console.print(f"MuJoCo: {warning}", style="yellow", highlight=False, soft_wrap=True)
     for reason in summary["reasons"]:
         console.print(f"why: {reason}", style="yellow", soft_wrap=True, highlight=False)
-    told = [event for event in run.events if not (event.state and event.world == run.worst_world and run.worlds == 1)]
-    for event in told[:_EVENTS]:
+    shown = [event for event in run.events if not (event.state and event.world == run.worst_world and run.worlds == 1)]
+    for event in shown[:_EVENTS]:
         console.print(f"world {event.world}, {event.time:.3f} s: {event.what}", style="yellow", soft_wrap=True)
     left_out = summary.get("events_left_out", 0)
-    if more := max(len(told) - _EVENTS, 0) + left_out:
+    if more := max(len(shown) - _EVENTS, 0) + left_out:
         there = f"{len(run.events)} of all" if left_out else "all"
         console.print(f"and {more} more events, {there} in summary.json", style="yellow")
 

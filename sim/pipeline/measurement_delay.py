@@ -21,7 +21,7 @@ class MeasurementDelay:
     def __call__(self, k: int, states: States) -> States:
         """What arrives at step k."""
         if k == 0:
-            self._under_way = deque([states.copy()] * self._steps)
-        self._under_way.append(states.copy())
+            self._under_way = deque([states] * self._steps)
+        self._under_way.append(states)
         late = self._under_way.popleft()
         return states.changed(late.values, late.fresh)

@@ -1,4 +1,4 @@
-"""The safe state: where there is no measurement or no answer for too long, or the object is too far off, it is lowered.
+"""The safe state: with no measurement, answer or contact for too long, or too far off its way, an object is lowered.
 
 Until then the last wrench is held, fixed to the object, where there is no new one: within a few milliseconds the object
 turns by little, and so does the contact force, which had friction to spare. For longer that is unsafe, because what is
@@ -12,22 +12,31 @@ import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.lowering import Lowering
 from pivoting.controller.pivot_model import PivotModel
-from pivoting.controller.rotations import angle_between
-from pivoting.controller.solution import BOUNDED, REPEATED, SAFE, SOLVED, UNCERTIFIED
+from pivoting.controller.rotations import rotation_matrix
+from pivoting.controller.solution import BOUNDED, REPEATED, SAFE, SOLVED, STATUS, UNCERTIFIED
 from pivoting.controller.validate import fail
 from pivoting.sim.pipeline.plan_log import Event
-from pivoting.sim.pipeline.stages import ANGULAR_VELOCITY, ORIENTATION, Answers, Control, Desired, Setting, States
+from pivoting.sim.pipeline.stages import (
+    ANGULAR_VELOCITY,
+    ORIENTATION,
+    Answers,
+    Control,
+    Desired,
+    Setting,
+    States,
+)
 
 Array = NDArray[np.float64]
-LOST = 0.01  # for how long no contact at all may be found before the object is let go [s]
-ANSWERS = (SOLVED, BOUNDED, UNCERTIFIED)
+LOST = 0.05  # for how long an object that is pressed may have no contact before it is let go [s]
+SLID = 0.02  # of the lever: a contact that seems to have moved by more has slid
+ANSWERED = np.isin(np.arange(len(STATUS)), (SOLVED, BOUNDED, UNCERTIFIED))  # by status
 
 
 class SafeState:
     """Goes over to the safe state, for good, in each world in which it has to.
 
     Args:
-        patience: for how long there may be no valid measurement, or no answer [s].
+        patience: for how long there may be no valid measurement, no answer or no contact [s].
 
     Attributes:
         events: which world went over to which state, when and why.
@@ -49,8 +58,11 @@ class SafeState:
         if patience < case.delay + dt:
             raise fail("safe_after", patience, f">= {case.delay + dt:g} s, a time step more than the delay")
         self.setting, self.steps = setting, setting.step("safe_after", patience)
-        self.angle = float(np.deg2rad(case.safe_angle))
+        self.cosine = float(np.cos(0.5 * np.deg2rad(case.safe_angle)))
         self.told = f"{patience:g} s", f"{case.safe_angle:g} deg"
+        self.slid = np.array([(SLID * each.units.length) ** 2 for each in setting.controllers])
+        self.rolls = any(contact.radius > 0.0 for each in setting.controllers for contact in each.contacts)
+        self.table = rotation_matrix(setting.controllers[0].space.base)
         self.lost = max(1, round(LOST / dt))
         self.bounds = case.bounds(setting.unit)
         self.model = PivotModel(setting.controllers, dt)
@@ -71,17 +83,19 @@ class _Guarded:
         self._inner, self._desired, self._stage = inner, Desired(desired), stage
         self.prepare = inner.prepare
         W = stage.setting.worlds
-        self._measured, self._answered = np.full(W, -1), np.full(W, -1)  # the last step in which there was one
+        # the last step in which there was one
+        self._measured, self._answered, self._touched = np.full(W, -1), np.full(W, -1), np.full(W, -1)
         self._safe, self._let_go = np.zeros(W, np.bool_), np.zeros(W, np.bool_)
         self._lost = np.zeros(W, np.int64)
         self._states, self._contacts, self._none = np.zeros((W, 13)), np.zeros(W), np.zeros((W, 3))
-        self._values: Array = np.zeros(0)
+        self._values, self._began = np.zeros(0), np.zeros((W, 3))
 
     def __call__(self, k: int, states: States, before: Array | None, out: Answers) -> None:
         self._inner(k, states, before, out)
         self._follow(k, states, before)
         self._hold(k, out)
-        self._go_over(k, states)
+        if k > 1:  # contacts are first read in the step before
+            self._go_over(k, states)
         for world in np.flatnonzero(self._safe):
             self._act(int(world), k, states, before, out)
 
@@ -93,12 +107,20 @@ class _Guarded:
         if before is not None and not valid.all():
             self._stage.model.advance(self._states, np.array(before), self._none)
         self._states[valid] = states.values[valid, :13]
+        self._touched[(states.touching > 0) | (k == 0)] = k
+        if k == 0:
+            self._began = self._contact()
+
+    def _contact(self) -> Array:
+        """(W, 3) where the contacts' mean seems to be, table axes."""
+        return np.asarray(self._stage.model.contacts(self._states) @ self._stage.table)
 
     def _hold(self, k: int, out: Answers) -> None:
         """The last answer again, where there is none."""
-        self._answered[np.isin(out.status, ANSWERS)] = k
-        missing = ~np.isfinite(out.wrench).all(axis=1) & (self._answered >= 0)
+        self._answered[ANSWERED[out.status]] = k
+        missing = ~np.isfinite(out.wrench).all(axis=1)
         if missing.any():
+            missing &= self._answered >= 0
             out.values[missing], out.status[missing] = self._values[missing], REPEATED
             out.residual[missing] = np.nan
         self._values = out.values.copy()
@@ -106,16 +128,21 @@ class _Guarded:
     def _go_over(self, k: int, states: States) -> None:
         """The worlds in which this step is the first of the safe state."""
         stage, (after, angle) = self._stage, self._stage.told
-        off = angle_between(self._states[:, ORIENTATION], self._desired.orientation[k])
+        cosine = np.abs(self._states[:, ORIENTATION] @ self._desired.orientation[k])  # of half the angle
+        shift = (self._contact() - self._began)[:, :2]
+        slid = (shift**2).sum(axis=1) > stage.slid
         whys = (
             (k - self._measured > stage.steps, f"no valid measurement for {after}"),
             (k - self._answered > stage.steps, f"no answer for {after}"),
-            (off > stage.angle, f"the angle is off by more than {angle}"),
+            (k - self._touched > stage.steps, f"no contact for {after}"),
+            (cosine < stage.cosine, f"the angle is off by more than {angle}"),
+            (slid & (not stage.rolls), f"the contact has slid by more than {100 * SLID:g} % of the lever"),
         )
         for due, why in whys:
-            for world in np.flatnonzero(due & ~self._safe):
-                self._tell(int(world), k, "lowered", f"from step {k} on: {why}")
-            self._safe |= due
+            if due.any():
+                for world in np.flatnonzero(due & ~self._safe):
+                    self._tell(int(world), k, "lowered", f"from step {k} on: {why}")
+                self._safe |= due
 
     def _act(self, world: int, k: int, states: States, before: Array | None, out: Answers) -> None:
         """The safe action in one world."""
@@ -128,7 +155,7 @@ class _Guarded:
             return
         lowering = stage.lowering[world % len(stage.lowering)]
         orientation, omega = self._states[world, ORIENTATION], self._states[world, ANGULAR_VELOCITY]
-        wrench, required = lowering.wrench(orientation, omega, blind=bool(self._measured[world] < k))
+        wrench, required = lowering.wrench(orientation, omega, blind=k - self._measured[world] > stage.steps)
         last = None if before is None else np.nan_to_num(before[world])[None]
         out.wrench[world] = stage.bounds.within(wrench[None], last, stage.setting.dt)[0]
         out.required[world], out.force[world] = required, lowering.force.ravel()

@@ -94,8 +94,11 @@ class States:
         Args:
             fresh: (W,) whether they are newly measured; None: where they were before.
         """
-        new = self.fresh if fresh is None else fresh
-        return States(values, self.joint_position, self.joint_velocity, self.touching, new)
+        changed = object.__new__(States)  # of what is shown already
+        changed.values, changed.touching = _shown(values), self.touching
+        changed.joint_position, changed.joint_velocity = self.joint_position, self.joint_velocity
+        changed.fresh = self.fresh if fresh is None else fresh
+        return changed
 
     @classmethod
     def turning(cls, orientation: Array, angular_velocity: Array) -> "States":

@@ -180,7 +180,7 @@ class LoopKeys:
     )
     safe_after: float = key(
         0.0,
-        "time without a valid measurement, or without an answer, after which the object is lowered; 0: never",
+        "time without a valid measurement, an answer or a contact after which the object is lowered; 0: never",
         group=COMPUTED,
         unit="s",
         at_least=0.0,
@@ -188,7 +188,7 @@ class LoopKeys:
         stage=(_CHECK, f"{_PIPELINE}.safe_state:SafeState"),
     )
     safe_angle: float = key(
-        5.0,
+        2.0,
         "error of the angle beyond which the object is lowered, too",
         group=COMPUTED,
         unit="deg",
