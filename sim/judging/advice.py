@@ -62,12 +62,11 @@ class _Case:
         return float(run.time[wrong.argmax()]) if wrong.any() else None
 
     @property
-    def gone_over(self) -> str | None:
-        """That and why it went over to a safe state, or None; whatever else it failed by follows from that."""
+    def gone_over(self) -> list[str]:
+        """That and why it went over to a safe state, if it did; whatever else it failed by follows from that."""
         if not self.run.measures.safe_s[self.world]:
-            return None
-        told = [event.what for event in self.run.events if event.world == self.world and event.state]
-        return "; ".join(told) or "safe state"
+            return []
+        return [event.what for event in self.run.events if event.world == self.world and event.state]
 
     @property
     def slid(self) -> int | None:
@@ -120,8 +119,8 @@ def _reasons(case: _Case, strays: list[str]) -> Iterator[str]:
     if case.diverged is not None:
         yield f"the object diverged at {case.diverged:.3g} s"
         return
-    if case.gone_over is not None:
-        yield case.gone_over
+    if case.gone_over:
+        yield from case.gone_over
         return
     yield from strays
     if case.let_go is not None and case.failed("contact_lost_s"):
@@ -161,7 +160,7 @@ def _reasons(case: _Case, strays: list[str]) -> Iterator[str]:
 
 def remedies(run: "Run") -> list[Remedy]:
     """Keys that may hold a failing run, the likeliest first; they are not tried here."""
-    if not run.failed_worlds.size or _Case(run).gone_over is not None:
+    if not run.failed_worlds.size or _Case(run).gone_over:
         return []
     found: dict[tuple[tuple[str, float], ...], Remedy] = {}
     for one in _remedies(_Case(run)):
