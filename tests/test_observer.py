@@ -7,8 +7,11 @@ from pivoting.controller.lowering import Lowering
 from pivoting.controller.motion import Motion
 from pivoting.controller.pivot_model import PivotModel
 from pivoting.controller.pose_observer import PoseObserver
-from pivoting.controller.rotations import angle_between
-from pivoting.sim.pipeline.stages import ANGULAR_VELOCITY, ORIENTATION, VELOCITY
+from pivoting.controller.rotations import CONJUGATE, angle_between, exponential, quaternion_product, rotation_vector
+from pivoting.sim.pipeline.free_reference import FreeReference
+from pivoting.sim.pipeline.stages import ANGULAR_VELOCITY, ORIENTATION, VELOCITY, Desired, States, desired_values
+from pivoting.sim.run_setup import set_up
+from pivoting.sim.scenarios.shipped_scenarios import scenario
 
 POSE = {"noise": 0.1, "noise_position": 5e-4, "delay": 0.002}
 SHORT = {"seconds": 1.0, "hold": 0.2, "theta_end": 45.0, "reference": "arc"}
@@ -145,6 +148,23 @@ def test_the_safe_action_presses_straight_along_the_normal_and_lowers() -> None:
         goal = lowering.rate(now[0, ORIENTATION], blind=False) @ controller.space.axial(1.0)
         assert np.sign(rate) == side
         assert rate == pytest.approx(float(goal), rel=0.05)
+
+
+@pytest.mark.parametrize(("name", "free"), [("pivot-3d", True), ("spin-3d", False)])
+def test_only_what_the_contacts_leave_free_is_fed_back(name: str, free: bool) -> None:
+    """About an edge one axis; about a vertex all."""
+    begun = set_up(scenario(name), None, worlds=2, seed=0, first_world=0)
+    axis = begun.world.turn[0]
+    across = np.cross(axis, [0.36, 0.48, 0.8])
+    now = begun.told[0][:1].repeat(2, axis=0)
+    off, rate, alpha = 0.01 * axis + 0.02 * across, axis - across, 3.0 * axis + across
+    wanted = Desired(desired_values(quaternion_product(exponential(off), now[0]), rate, alpha)[None])
+    states = States.turning(now, np.zeros((2, 3)))
+    given = FreeReference(60.0, begun.setting)(states, wanted)
+    left = [0.01 * axis, axis, 3.0 * axis] if free else [off, rate, alpha]
+    error = rotation_vector(quaternion_product(given.orientation, now * CONJUGATE))
+    for values, expected in zip((error, given.angular_velocity, given.angular_acceleration), left, strict=True):
+        np.testing.assert_allclose(np.broadcast_to(values, (2, 3)), np.array([expected, expected]), atol=1e-9)
 
 
 @pytest.mark.parametrize("wrong", [0.0, -1.0, np.nan])
