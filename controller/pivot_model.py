@@ -27,7 +27,7 @@ class PivotModel:
         beliefs = [controller.belief for controller in controllers]
         self._pivot = np.array([belief.contacts.pivot for belief in beliefs])
         self._offset = np.array([belief.contacts.offset for belief in beliefs])
-        nw = len(controllers[0].Q_w)
+        nw = self._nw = len(controllers[0].Q_w)
         self._beliefs, self._dt = for_worlds(beliefs), dt
         self.axes = np.array(
             [free_axes(belief.contacts.points, belief.contacts.pivot, belief.source.map) for belief in beliefs]
@@ -35,6 +35,14 @@ class PivotModel:
         sizes = (3, 3), (nw,), (3, nw), (3, nw), (3, 4), (3,), (3,), (4,)
         self._spin = np.zeros(6)
         self._scratch = tuple(np.zeros(size) for size in sizes)
+
+    def prepare(self) -> None:
+        """Compile, on one world that comes to nothing."""
+        states, still, fresh = np.zeros((1, 13)), np.zeros((1, 3)), np.zeros(1, np.bool_)
+        states[0, 3] = 1.0
+        self.advance(states, np.zeros((1, self._nw)), still)
+        self.correct(0.0, states.copy(), fresh, states, still, np.zeros((1, 3, 3)))
+        self.contacts(states)
 
     def advance(self, states: Array, wrenches: Array, added: Array) -> None:
         """Move states (W, 13) one time step on, in place.

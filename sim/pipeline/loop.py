@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from itertools import chain
 from threading import Event
 from time import perf_counter, perf_counter_ns
 
@@ -52,6 +53,9 @@ class Steps:
         with first_calls():
             first_answers = Answers(log.answers.values[0], log.answers.status[0], nw)
             self._control.prepare(states, first_answers)
+            for prepare in (getattr(stage, "prepare", None) for stage in chain(*self._stages)):
+                if prepare is not None:
+                    prepare()
             self._apply(states, first_answers.values, nw, log.wrench_world[0])
             self._contacts.sort(0, log.states[:0], self._block[:0])
 

@@ -34,6 +34,7 @@ class ModelObserver:
             raise fail("observer", bandwidth, f"at most {1.0 / (apart * dt):g} rad/s, one for each measurement")
         self._observer = PoseObserver(setting.controllers, bandwidth, dt, apart * dt)
         self._wrenches: deque[Array] = deque(maxlen=self._late)
+        self.prepare = self._observer.model.prepare
 
     def __call__(self, k: int, measured: States, applied: Array | None) -> States:
         """The states as they are estimated for the start of step k."""

@@ -66,6 +66,7 @@ class SafeState:
         self.lost = max(1, round(LOST / dt))
         self.bounds = case.bounds(setting.unit)
         self.model = PivotModel(setting.controllers, dt)
+        self.prepare = self.model.prepare
         press = None if case.safe_press is None else float(case.safe_press) / setting.unit
         self.lowering = [
             Lowering(each, 2.0 * each.units.force if press is None else press) for each in setting.controllers
