@@ -135,6 +135,14 @@ def exponential(vector: Array) -> Array:
     return np.concatenate([np.cos(0.5 * angle), 0.5 * np.sinc(angle / (2.0 * np.pi)) * vector], axis=-1)
 
 
+def rotation_vector(quaternion: Array) -> Array:
+    """The rotation vectors (..., 3) [rad] of unit quaternions (..., 4), the shorter way round."""
+    shorter = quaternion * np.where(quaternion[..., :1] < 0.0, -1.0, 1.0)
+    sine = np.linalg.norm(shorter[..., 1:], axis=-1, keepdims=True)
+    scale = 2.0 * np.arctan2(sine, shorter[..., :1]) / np.where(sine > 0.0, sine, 1.0)
+    return np.asarray(scale * shorter[..., 1:])
+
+
 @kernel
 def fill_differences(orientation, out):  # type: ignore[no-untyped-def]
     """Write the rotation vectors (N, 3) [rad], in object axes, from each of (N+1, 4) orientations to the next."""

@@ -112,6 +112,25 @@ class WrenchBounds:
         fill_excess(self.stacked(nw), wrench.reshape(-1, nw), last.reshape(-1, nw), dt, out)
         return float(out.max(initial=-1.0))
 
+    def within(self, wrench: Array, before: Array | None, dt: float) -> Array:
+        """Wrenches (W, nw) as an actuator makes them that stops at its bounds: the nearest, one bound after another.
+
+        Args:
+            before: (W, nw) that acted `dt` [s] earlier, within the bounds; None leaves the bounds on rates out.
+        """
+        acting, still = wrench.copy(), np.zeros_like(wrench)
+        for ball in sorted(self.balls(wrench.shape[1]), key=lambda ball: not ball.rate):
+            if not ball.rate:
+                most, since = ball.radius, still
+            elif before is not None:
+                most, since = ball.radius * dt, before
+            else:
+                continue
+            part = (acting - since) @ ball.rows.T
+            size = np.linalg.norm(part, axis=1, keepdims=True)
+            acting -= (part - part * np.minimum(1.0, most / np.maximum(size, 1e-300))) @ ball.rows
+        return acting  # what is scaled back towards 0 stays near to `before`, which is within the bounds
+
 
 @kernel
 def fill_excess(stacked, wrench, before, dt, out):  # type: ignore[no-untyped-def]

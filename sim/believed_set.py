@@ -17,7 +17,7 @@ def believed_set(case: Scenario, body: RigidBody, unit: float = 1.0) -> Uncertai
         unit: of the model's lengths [m], in which the set is then.
     """
     told = believed_values(case)
-    errors = case.shove, case.theta_error, case.omega_error
+    errors = case.shove_bound, case.theta_error, case.omega_error
     if not any(isinstance(value, Interval) for value in told.values()) and not any(errors):
         return None
     intervals = {key: _interval(value) for key, value in told.items()}
@@ -32,7 +32,8 @@ def believed_set(case: Scenario, body: RigidBody, unit: float = 1.0) -> Uncertai
         com=np.array([[-each.half, each.half] for each in offsets]) / unit,
         inertia=1.0 if inertia is None else np.divide(inertia, inertia.middle),
         mu=mu if isinstance(mu, Interval) else None,
-        shove=case.shove / unit,
+        shove=case.shove_bound / unit,
+        shove_seconds=case.shove_seconds,
         theta=np.deg2rad(case.theta_error),
         omega=np.deg2rad(case.omega_error),
     )

@@ -169,7 +169,7 @@ class Experiment:
     @cached_property
     def checks(self) -> tuple[Check, ...]:
         """The verdict, line by line."""
-        return judge(self.measures, self.limits, self.certified)
+        return judge(self.measures, self.limits, self.certified, self.scenario.safe_after > 0.0)
 
     @property
     def failed_worlds(self) -> NDArray[np.intp]:

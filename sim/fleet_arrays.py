@@ -41,6 +41,8 @@ _MEASURES = {  # what they are; dimension and unit follow from the name
     "force_mismatch_rel": "RMS of the measured minus the predicted contact force, over the RMS of the predicted",
     "residual_max": "greatest relative KKT residual",
     "unsolved_steps": "steps without a certified answer",
+    "repeated_steps": "steps in which the last answer was used again",
+    "safe_s": "time in a safe state",
 }
 _OTHERS: dict[str, Meaning] = {
     "angle_error": ("world state", "rad", "angle from the desired orientation"),

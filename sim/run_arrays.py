@@ -61,6 +61,11 @@ _MEANINGS = {  # name: dimensions, unit, what it is
     "status": ("world step", "", "status of the answer"),
     "stance": ("world step", "", "number of the stance, the set of contacts that are to hold"),
     "acting": ("world step component", "N, N m", "wrench that acted, object axes"),
+    "disturbance": (
+        "world step wrench_axis",
+        "N, N m",
+        "force and torque on the object besides, at the centre of mass, world axes",
+    ),
     "wrench_world": (
         "world step wrench_axis",
         "N, N m",
@@ -112,7 +117,8 @@ def named_arrays(run: "Run") -> dict[str, Array]:
         _of_states("", log.states) | _of_states("measured_", log.measured) | _of_states("estimated_", log.estimated)
     )
     found |= {name: getattr(log.answers, name) for name in _ANSWERS}
-    found |= {"force": run.force, "acting": log.acting, "wrench_world": log.wrench_world}
+    found |= {"force": run.force, "acting": log.acting, "disturbance": log.disturbance}
+    found |= {"wrench_world": log.wrench_world}
     found |= _of_fields("contact_", log.contacts) | _of_fields("held_", log.held) | {"control_ns": log.control_ns}
     found |= dict(zip(("start_qpos", "start_qvel"), run.start, strict=True))
     found |= {"stance": run.stance} | own_values(run)
@@ -184,6 +190,7 @@ def log_of(arrays: Arrays) -> Log:
                 np.concatenate(list(flat.values()), axis=-1), stepped["status"], stepped["wrench"].shape[-1]
             ),
             acting=stepped.get("acting"),
+            disturbance=stepped.get("disturbance"),
             wrench_world=stepped["wrench_world"],
             contacts=ContactReadings(**{name: stepped[f"contact_{name}"] for name in ContactReadings._fields}),
             held=RowEffects(**{name: stepped[f"held_{name}"] for name in RowEffects._fields}),

@@ -72,8 +72,9 @@ class Begun(NamedTuple):
     def part(self, first: int, worlds: int) -> "Begun":
         """The same for some of the worlds, from that with the index `first` on."""
         setting = self.setting
-        some = setting._replace(worlds=worlds, first_world=setting.first_world + first)
-        return self._replace(setting=some, belief=self.belief.part(first, worlds), world=self.world.part(first, worlds))
+        belief = self.belief.part(first, worlds)
+        some = setting._replace(worlds=worlds, first_world=setting.first_world + first, controllers=belief.controllers)
+        return self._replace(setting=some, belief=belief, world=self.world.part(first, worlds))
 
 
 def set_up(
@@ -98,7 +99,7 @@ def set_up(
     world = world.of(0) if worlds == 1 else world
     turning = -matrix(belief.placement.body.table)[:, 1:2].T if belief.placement.body.dim == 2 else np.eye(3)
     counts = int(seed), int(worlds), int(first_world)
-    setting = Setting(*counts, world.dt, turning, belief.attached.controller.law)
+    setting = Setting(*counts, world.dt, turning, belief.attached.controller.law, case, belief.controllers, world.unit)
     timed = _timed(case, belief, world)
     return Begun(asked, case, belief, world, *timed, setting)
 

@@ -1,6 +1,7 @@
 """The control of a scenario: its law on its reference, a horizon, bounds, stances; and the stages around it."""
 
 from collections.abc import Sequence
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,8 @@ from pivoting.sim.joint_drag import drag_wrench
 from pivoting.sim.pipeline.bounded_control import BoundedControl
 from pivoting.sim.pipeline.law_control import LawControl, LawSolver
 from pivoting.sim.pipeline.own_control import OwnControl, OwnControlFunction
-from pivoting.sim.pipeline.stages import Control, Observe, Stages, build_stages
+from pivoting.sim.pipeline.plan_log import Event
+from pivoting.sim.pipeline.stages import Control, Observe, Stages, build_stages, desired_values
 from pivoting.sim.pipeline.stance_control import StanceControl
 from pivoting.sim.run_setup import Begun
 from pivoting.sim.scenario_horizon import plan_playback, receding_horizon_control
@@ -18,11 +20,24 @@ from pivoting.sim.stances import Stance
 
 
 class Decided(NamedTuple):
-    """What decides: the control, with the law that the first stance ends in, and the stages around it."""
+    """What decides.
+
+    Attributes:
+        control: the scenario's own, or the user's.  asked: what is asked at every step, with what stands around it.
+        per_step: the law that the first stance ends in.
+        stages: around the control.
+    """
 
     control: Control
+    asked: Control
     per_step: LawControl
     stages: Stages
+
+    @property
+    def events(self) -> list[Event]:
+        """What a user has to know of, of the plans and of all stages."""
+        inner = self.control.inner if isinstance(self.control, BoundedControl) else self.control
+        return [event for each in (inner, *chain(*self.stages)) for event in getattr(each, "events", ())]
 
 
 def stages_of(begun: Begun, observe: Observe | None = None) -> Stages:
@@ -49,14 +64,16 @@ def decide(
     planned = open_loop or case.plan_hz is not None
     if len(stances) > 1 and (planned or stages.correct):
         raise fail("landing", "held", "ignored with a plan or integral action, which know one stance")
+    control: Control
     if own is not None:
-        return Decided(OwnControl(own, begun.told, dt, begun.setting.first_world), laws[0], stages)
-    if len(stances) == 1:
+        control = OwnControl(own, begun.told, dt, begun.setting.first_world)
+    elif len(stances) == 1:
         control = _planned(begun, solvers[0], open_loop) if planned else laws[0]
-        bounded = control if open_loop else _bounded(begun, control, stances[0])  # a plan is within them
-        return Decided(bounded, laws[0], stages)
-    controls = [_bounded(begun, law, stance) for law, stance in zip(laws, stances, strict=True)]
-    return Decided(StanceControl(stances, controls, dt, begun.setting.worlds, begun.steps), laws[0], stages)
+        control = control if open_loop else _bounded(begun, control, stances[0])  # a plan is within them
+    else:
+        controls = [_bounded(begun, law, stance) for law, stance in zip(laws, stances, strict=True)]
+        control = StanceControl(stances, controls, dt, begun.setting.worlds, begun.steps)
+    return Decided(control, stages.around(control, desired_values(*begun.told)), laws[0], stages)
 
 
 def _law_control(begun: Begun, solver: LawSolver, stance: Stance) -> LawControl:

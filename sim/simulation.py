@@ -1,7 +1,7 @@
 """`simulate`: a closed-loop run, from a scenario to what is measured."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from itertools import pairwise
@@ -23,6 +23,7 @@ from pivoting.sim.pipeline.law_control import LawControl
 from pivoting.sim.pipeline.log import Log, empty_log, some_worlds, worlds_first
 from pivoting.sim.pipeline.loop import Steps, run_steps
 from pivoting.sim.pipeline.own_control import OwnControlFunction
+from pivoting.sim.pipeline.plan_log import Event
 from pivoting.sim.pipeline.plan_playback import PlanPlayback
 from pivoting.sim.pipeline.plant import Plant
 from pivoting.sim.pipeline.receding_horizon_control import RecedingHorizonControl
@@ -134,7 +135,7 @@ def run_worlds(
     """
     decided = _decided(begun, handed, open_loop)
     bounds = _lanes(begun.setting.worlds) if _plain(decided, handed) else [(0, begun.setting.worlds)]
-    log, lanes, starts = new_log(begun, decided), [], []
+    log, lanes, starts, parts = new_log(begun, decided), [], [], []
     begun.world.read()
     for first, last in bounds:
         part = begun.part(first, last - first)
@@ -143,13 +144,17 @@ def run_worlds(
         starts.append(start_of(batch))
         apply = free_wrench(part, batch)
         plant = Plant(batch, begun.world.sensors)
+        for disturb in own.stages.disturb:
+            disturb.begin(batch, begun.world)
         lanes.append(steps_of(part, own, plant, apply, some_worlds(log, first, last)))
+        parts.append((first, own))
     with hearing as warned:
         wall_s = run_steps(lanes, progress)
     log.control_ns[:] = sum(lane.log.control_ns for lane in lanes)
     qpos, qvel = (frozen(np.concatenate(values)) for values in zip(*starts, strict=True))
     made = (qpos, qvel), worlds_first(log), wall_s
-    return kept(begun, decided, made, (*begun.world.warned, *warned), handed.names)
+    events = [event._replace(world=first + event.world) for first, own in parts for event in own.events]
+    return kept(begun, decided, made, events, (*begun.world.warned, *warned), handed.names)
 
 
 def _decided(begun: Begun, handed: Handed, open_loop: bool) -> Decided:
@@ -160,7 +165,7 @@ def _decided(begun: Begun, handed: Handed, open_loop: bool) -> Decided:
 
 def _plain(decided: Decided, handed: Handed) -> bool:
     """Whether Python has little to do at a step: no plan is made, and no function of the user's own is called."""
-    return isinstance(decided.control, LawControl) and handed.observe is None
+    return isinstance(decided.asked, LawControl) and handed.observe is None
 
 
 def _lanes(worlds: int) -> list[tuple[int, int]]:
@@ -216,17 +221,18 @@ def steps_of(begun: Begun, decided: Decided, plant: Plant, apply: FreeWrench, lo
     table = matrix(world.truth.table)
     rows = [each.rows for each in world.truths]
     contacts = ContactLog(world.declared, rows, table, world.sensors, plant.worlds, log.contacts, log.held)
-    return Steps(plant, decided.stages, decided.control, apply, contacts, log)
+    return Steps(plant, decided.stages, decided.asked, apply, contacts, log)
 
 
 def kept(
     begun: Begun,
     decided: Decided,
     made: tuple[tuple[Array, Array], Log, float],
+    events: Sequence[Event],
     warnings: tuple[str, ...] = (),
     python_objects: tuple[str, ...] = (),
 ) -> Run:
-    """The finished run; `made`: where it started, its log, and the time that it took [s]."""
+    """The finished run; `made`: where it started, its log, and the time that it took [s]; `events`: of all worlds."""
     start, log, wall_s = made
     control = decided.control
     planned = control.inner if isinstance(control, BoundedControl) else control
@@ -240,7 +246,7 @@ def kept(
         plan=planned.plan if isinstance(planned, PlanPlayback) else None,
         stance=control.by_world() if isinstance(control, StanceControl) else None,
         plans=None if horizons is None else horizons.log,
-        events=() if horizons is None else tuple(horizons.events),
+        events=tuple(sorted(events, key=lambda event: event.time)),
         engine_warnings=warnings,
         python_objects=python_objects,
     )

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from pivoting.controller.validate import frozen
 from pivoting.models.frames import matrix
 from pivoting.sim.judging.predicted_slip import stepped_point
+from pivoting.sim.pipeline.falling_friction import friction_at
 from pivoting.sim.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -92,13 +93,19 @@ class ContactMotion(Trajectory):
 
     @cached_property
     def friction_use(self) -> Array:
-        """(W, N, K) measured |f_t| / (mu f_n) with the world's mu, at 1 a contact slides; nan without a push and
-        where none is meant to hold."""
+        """(W, N, K) measured |f_t| / (mu f_n) with the world's mu at that time, at 1 a contact slides; nan without a
+        push and where none is meant to hold."""
         tangential = np.linalg.norm(self.force_measured[..., :-1], axis=-1)
         normal = self.force_measured[..., -1]
         pushed = (normal > 0.0) & self.standing
-        mu = np.array([each.mu for each in self.world.truths])[:, None, None]
-        return frozen(np.where(pushed, tangential, np.nan) / np.where(pushed, mu * normal, 1.0))
+        return frozen(np.where(pushed, tangential, np.nan) / np.where(pushed, self.friction * normal, 1.0))
+
+    @property
+    def friction(self) -> Array:
+        """(W, N, 1) each world's friction coefficient in each step."""
+        case = self.scenario.absolute(self.load)
+        each = [friction_at(case, truth.mu, self.time[:-1], self.dt) for truth in self.world.truths]
+        return frozen(np.array(each)[..., None])
 
     @cached_property
     def landed(self) -> NDArray[np.bool_]:

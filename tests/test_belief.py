@@ -64,12 +64,14 @@ def test_a_fleet_in_chunks_has_the_controller_of_each_world(tmp_path: Path, monk
 
 
 def test_beliefs_that_are_shared_are_stacked_once() -> None:
-    (mass, _, _), contacts, (wrench_map, _), law = for_worlds([believing(1.0).belief, believing(2.0, 0.3, 0.1).belief])
+    beliefs, unknown = for_worlds([believing(1.0).belief, believing(2.0, 0.3, 0.1).belief])
+    assert unknown is None
+    (mass, _, _), contacts, (wrench_map, _), law = beliefs
     assert mass.tolist() == [1.0, 2.0]
     assert contacts[6].tolist() == [[0.4], [0.3]]
     assert wrench_map.shape == (3, 6)
     assert law == believing(1.0).belief.law
-    assert for_worlds([believing(1.0).belief])[0][0].shape == (1,)
+    assert for_worlds([believing(1.0).belief])[0][0][0].shape == (1,)
 
 
 @pytest.mark.parametrize(

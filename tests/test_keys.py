@@ -110,7 +110,7 @@ def test_a_new_key_needs_nothing_but_its_field() -> None:
     case = noisy(blur="0.5", taps="5", force_floor="0.5w")
     assert isinstance(case, Noisy)
     assert (case.blur, case.taps, case.force_floor) == (0.5, 5, "0.5w")
-    assert declared_keys(Noisy)["blur"].stage == "pivoting.sim.pipeline.measurement_noise:MeasurementNoise"
+    assert declared_keys(Noisy)["blur"].stages == ("pivoting.sim.pipeline.measurement_noise:MeasurementNoise",)
     rows = dict(dict(described(Noisy))["sensing"])
     assert rows["blur"] == "blur of the angle [>= 0 deg; default: none]"
     assert rows["taps"] == "taps of a filter [>= 1; default: 3; only if blur is set]"

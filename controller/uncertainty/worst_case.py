@@ -125,7 +125,7 @@ def worst_case(
 
 
 def world_at(controller: WrenchController, shares: Array) -> World:
-    """The world at shares in [0, 1] of all that is unknown: of the set's member, and (3,) each of push, tilt and spin."""
+    """The world at shares in [0, 1] of all that is unknown: of a member, and (3,) each of push, tilt and spin."""
     known, dim = _known(controller), controller.space.dim
     unknown = known.unknowns
     most = max(map(abs, known.shove)) / known.shove_seconds, max(map(abs, known.theta)), max(map(abs, known.omega))

@@ -293,7 +293,9 @@ def _advised(advice: dict[str, Any]) -> str:
     """What would hold a failing run, or what was tried in vain."""
     if advice["holds"]:
         return f"what would hold it: {advice['setting']} ({advice['why']}; tried, it passes)"
-    vain = "; ".join(advice["tried"]) or "nothing fits"
+    if not advice["tried"]:
+        return "no key is known that would hold it"
+    vain = "; ".join(advice["tried"])
     more = f", and {len(advice['untried'])} more were not tried" if advice["untried"] else ""
     return f"nothing was found that would hold it: tried {vain}{more}"
 

@@ -37,6 +37,7 @@ _LINES = {
     "contacts_missing": ("contacts missing at the end", 1.0, ""),
     "bounce_m": ("height regained after landing", 1e3, "mm"),
     "unsolved_steps": ("steps without a certified answer", 1.0, ""),
+    "safe_s": ("time in a safe state", 1.0, "s"),
 }
 
 
@@ -131,14 +132,18 @@ def _print_notes(console: Console, run: Experiment, summary: Mapping[str, Any]) 
         steps = run.worlds * (len(run.time) - 1)
         told = f"{summary['bounded_steps']} of {steps} steps: the bounds did not allow what was asked for"
         console.print(told, style="yellow", soft_wrap=True)
+    if repeated := int(run.measures.repeated_steps.sum()):
+        steps = run.worlds * (len(run.time) - 1)
+        console.print(f"{repeated} of {steps} steps: the last answer again", style="yellow", soft_wrap=True)
     for warning in run.engine_warnings:
         console.print(f"MuJoCo: {warning}", style="yellow", highlight=False, soft_wrap=True)
     for reason in summary["reasons"]:
         console.print(f"why: {reason}", style="yellow", soft_wrap=True, highlight=False)
-    for event in run.events[:_EVENTS]:
+    shown = [event for event in run.events if not (event.state and event.world == run.worst_world and run.worlds == 1)]
+    for event in shown[:_EVENTS]:
         console.print(f"world {event.world}, {event.time:.3f} s: {event.what}", style="yellow", soft_wrap=True)
     left_out = summary.get("events_left_out", 0)
-    if more := max(len(run.events) - _EVENTS, 0) + left_out:
+    if more := max(len(shown) - _EVENTS, 0) + left_out:
         there = f"{len(run.events)} of all" if left_out else "all"
         console.print(f"and {more} more events, {there} in summary.json", style="yellow")
 

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pivoting.controller.solution import BOUNDED, FAILED, INACCURATE, STATUS
+from pivoting.controller.solution import BOUNDED, FAILED, INACCURATE, REPEATED, SAFE, STATUS
 from pivoting.controller.solution_space import SolutionSpace
 from pivoting.controller.validate import fail
 from pivoting.errors import PivotingError
@@ -63,6 +63,8 @@ LACKING = {  # status of an answer that does not give what is required -> what i
     BOUNDED: "bounded: lacking",
     INACCURATE: "inaccurate: lacking",
     FAILED: "no answer, nothing applied: lacking",
+    REPEATED: "the last answer again: lacking",
+    SAFE: "safe state: lacking",
 }
 TITLES = {  # plot -> title, where the legend is
     "angle": ("angle [deg]", "LeftTop"),

@@ -69,6 +69,13 @@ class _Case:
         return float(run.time[wrong.argmax()]) if wrong.any() else None
 
     @property
+    def gone_over(self) -> list[str]:
+        """That and why it went over to a safe state, if it did; whatever else it failed by follows from that."""
+        if not self.run.measures.safe_s[self.world]:
+            return []
+        return [event.what for event in self.run.events if event.world == self.world and event.state]
+
+    @property
     def slid(self) -> int | None:
         """The first step at which a contact slides."""
         use = np.nan_to_num(self.run.friction_use[self.world]).max(axis=1)
@@ -82,9 +89,15 @@ class _Case:
         return int(lost.argmax()) if lost.any() else None
 
     @property
+    def friction(self) -> Array:
+        """(N, 1) the friction coefficient of its world."""
+        each = self.run.friction
+        return each[self.world % len(each)]
+
+    @property
     def friction_found(self) -> float:
         """Greatest |f_t| / f_n of a contact that pushes."""
-        return float(np.nanmax(self.run.friction_use[self.world], initial=0.0)) * self.truth.mu
+        return float(np.nanmax(self.run.friction_use[self.world] * self.friction, initial=0.0))
 
     @property
     def least_push(self) -> float:
@@ -119,6 +132,9 @@ def _reasons(case: _Case, strays: list[str]) -> Iterator[str]:
     if case.diverged is not None:
         yield f"the object diverged at {case.diverged:.3g} s"
         return
+    if case.gone_over:
+        yield from case.gone_over
+        return
     yield from strays
     if case.let_go is not None and case.failed("contact_lost_s"):
         k = case.let_go
@@ -131,7 +147,7 @@ def _reasons(case: _Case, strays: list[str]) -> Iterator[str]:
     if case.slid is not None and (case.failed("slip_max_m") or case.failed("friction_use_max")):
         k = case.slid
         at = f"at {run.time[k]:.3g} s ({theta[k]:.3g} deg)"
-        yield f"the contact slid {at}: |f_t| reached mu f_n, mu = {case.truth.mu:.3g}"
+        yield f"the contact slid {at}: |f_t| reached mu f_n, mu = {float(case.friction[k, 0]):.3g}"
     elif case.failed("slip_max_m"):
         floor, slip = float(run.measures.slip_floor_m[i]), float(run.measures.slip_max_m[i])
         part = "unpredicted"
@@ -161,7 +177,7 @@ def _reasons(case: _Case, strays: list[str]) -> Iterator[str]:
 
 def remedies(run: "Run") -> list[Remedy]:
     """Keys that may hold a failing run, the likeliest first; they are not tried here."""
-    if not run.failed_worlds.size:
+    if not run.failed_worlds.size or _Case(run).gone_over:
         return []
     found: dict[tuple[tuple[str, float], ...], Remedy] = {}
     for one in _remedies(_Case(run)):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.controller.solution import FAILED, INACCURATE
+from pivoting.controller.solution import FAILED, INACCURATE, REPEATED, SAFE
 from pivoting.models.contact_softness import ContactRows
 from pivoting.sim.judging.expected_force import expected_force
 from pivoting.sim.judging.implicit_step import unseen
@@ -38,8 +38,11 @@ class Measures:
         friction_use_max: measured |f_t| / (mu f_n) with the world's mu; nan if there never was a push.
         force_mismatch_rel: RMS of measured minus predicted contact force over RMS of the predicted; of a set of objects
             that predicted of each world's own, see `expected_force`.
-        residual_max: greatest KKT residual; inf where a step had no answer.
-        unsolved_steps: steps without an answer within tolerance; within bounds is one.
+        residual_max: greatest KKT residual of an answer; inf where a step that was to have one had none.
+        unsolved_steps: steps without an answer within tolerance; within bounds is one. The last answer again, and the
+            action of a safe state, are none, but are counted for themselves.
+        repeated_steps: steps in which the last answer was used again.
+        safe_s: time in a safe state, which lasts until the end.
     """
 
     slip_max_m: Array
@@ -55,6 +58,8 @@ class Measures:
     force_mismatch_rel: Array
     residual_max: Array
     unsolved_steps: Array
+    repeated_steps: Array
+    safe_s: Array
 
 
 @np.errstate(invalid="ignore", divide="ignore", over="ignore")  # a world that diverges fails, without noise
@@ -81,9 +86,17 @@ def measure(run: "ContactMotion") -> Measures:
         bounce_m=run.unit * _bounce(run),
         friction_use_max=np.where(ever, np.where(pushed, use, 0.0).max(axis=(1, 2)), np.nan),
         force_mismatch_rel=_mismatch(run, steps),
-        residual_max=np.where(np.isfinite(run.residual), run.residual, np.inf).max(axis=1),
+        residual_max=_residual(run).max(axis=1),
         unsolved_steps=np.isin(run.status, (INACCURATE, FAILED)).sum(axis=1).astype(float),
+        repeated_steps=(run.status == REPEATED).sum(axis=1).astype(float),
+        safe_s=(run.status == SAFE).sum(axis=1) * run.dt,
     )
+
+
+def _residual(run: "ContactMotion") -> Array:
+    """(W, N) KKT residuals, 0 in steps that have no answer of their own."""
+    own = np.where(np.isfinite(run.residual), run.residual, np.inf)
+    return np.where(np.isin(run.status, (REPEATED, SAFE)), 0.0, own)
 
 
 def _mismatch(run: "ContactMotion", steps: NDArray[np.bool_]) -> Array:

@@ -124,11 +124,12 @@ class Check:
         return not self.failed.any()
 
 
-def judge(measures: "Measures", limits: Limits, certified: bool = True) -> tuple[Check, ...]:
+def judge(measures: "Measures", limits: Limits, certified: bool = True, guarded: bool = False) -> tuple[Check, ...]:
     """Every check of a run; a value that is not finite fails.
 
     Args:
         certified: whether the answers carry certificates and predicted contact forces; without, none is checked.
+        guarded: whether a world may go over to a safe state, which is not what it was to do.
     """
     assert limits.slip_m is not None, "limits are for a lever"
     pairs = {
@@ -144,6 +145,8 @@ def judge(measures: "Measures", limits: Limits, certified: bool = True) -> tuple
     }
     if not certified:
         del pairs["force_mismatch_rel"]
+    if guarded:
+        pairs["safe_s"] = measures.safe_s, 0.0
     if limits.contacts_end:
         pairs |= {
             "contacts_missing": (measures.contacts_missing, 0.0),

@@ -38,6 +38,10 @@ class FreeWrench:
         if self._offsets is not None:
             count_at_com(states.values, self._offsets, out, self._xfrc, self._body)
 
+    def add(self, wrenches: Array) -> None:
+        """Add forces and torques (W, 6) at the centre of mass, world axes, to what was applied in this step."""
+        self._xfrc[:, self._body] += wrenches
+
 
 class PushedWrench(FreeWrench):
     """The same, and for some steps a push that the control neither makes nor knows of, and that no log shows.

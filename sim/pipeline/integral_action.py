@@ -1,7 +1,7 @@
 """Integral action: what remains of the angle error is summed up and added to the acceleration that the law asks for."""
 
 import numpy as np
-from pivoting.controller.rotations import CONJUGATE, quaternion_product
+from pivoting.controller.rotations import CONJUGATE, quaternion_product, rotation_vector
 from pivoting.controller.validate import fail
 from pivoting.sim.pipeline.stages import Desired, Setting, States
 
@@ -32,11 +32,8 @@ class IntegralAction:
 
     def __call__(self, states: States, desired: Desired) -> Desired:
         """The reference with the integral of the error, up to this step, in its acceleration."""
-        turned = quaternion_product(desired.orientation, states.orientation * CONJUGATE)
-        turned *= np.where(turned[:, :1] < 0.0, -1.0, 1.0)  # the shorter way round
-        sine = np.linalg.norm(turned[:, 1:], axis=1, keepdims=True)
-        scale = 2.0 * np.arctan2(sine, turned[:, :1]) / np.where(sine > 0.0, sine, 1.0)
-        self._integral += self._dt * scale * turned[:, 1:]
+        turned = rotation_vector(quaternion_product(desired.orientation, states.orientation * CONJUGATE))
+        self._integral += self._dt * np.where(np.isfinite(turned), turned, 0.0)  # of no measurement, nothing is kept
         corrected = Desired(np.broadcast_to(desired.values, (len(states.values), desired.values.shape[1])).copy())
         corrected.angular_acceleration[:] += self._gain * self._integral
         return corrected

@@ -24,6 +24,8 @@ class Log(NamedTuple):
         measured, estimated: (W, N, 13) likewise, by sensing and by the observer; None where they change nothing.
         answers: `Answers`, (W, N, ...).
         acting: (W, N, nw) wrenches that act, object axes; None where the actuators change nothing.
+        disturbance: (W, N, 6) force and torque on the object besides, at the centre of mass, world axes; None where
+            nothing disturbs it.
         wrench_world: (W, N, 6) the same as force and torque at the centre of mass, world axes.
         contacts, held: `ContactReadings` and `RowEffects`, (W, N, ...).
         control_ns: (N,) for all worlds together.
@@ -34,6 +36,7 @@ class Log(NamedTuple):
     estimated: Array | None
     answers: Answers
     acting: Array | None
+    disturbance: Array | None
     wrench_world: Array
     contacts: ContactReadings
     held: RowEffects
@@ -54,6 +57,7 @@ def empty_log(steps: int, worlds: int, widths: tuple[int, int], contacts: int, s
         estimated=np.empty((*both, STATE)) if stages.observe else None,
         answers=Answers.empty(both, nw, n),
         acting=np.empty((*both, nw)) if stages.actuate else None,
+        disturbance=np.zeros((*both, 6)) if stages.disturb else None,
         wrench_world=np.empty((*both, 6)),
         contacts=ContactReadings(*(np.empty((*both, *rest)) for rest in ((K, 3), (), (), (), ()))),
         held=RowEffects(np.full((*both, K, 2), np.nan), np.zeros((*both, K)), np.zeros((*both, K), np.bool_)),

@@ -1,7 +1,8 @@
-"""The steps of a closed loop: sense, observe, control, actuate, apply, step; and what each of them gives is logged."""
+"""The steps of a closed loop: sense, observe, control, actuate, apply, disturb, step; all of it is logged."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from itertools import chain
 from threading import Event
 from time import perf_counter, perf_counter_ns
 
@@ -52,6 +53,9 @@ class Steps:
         with first_calls():
             first_answers = Answers(log.answers.values[0], log.answers.status[0], nw)
             self._control.prepare(states, first_answers)
+            for prepare in (getattr(stage, "prepare", None) for stage in chain(*self._stages)):
+                if prepare is not None:
+                    prepare()
             self._apply(states, first_answers.values, nw, log.wrench_world[0])
             self._contacts.sort(0, log.states[:0], self._block[:0])
 
@@ -74,6 +78,8 @@ class Steps:
             before = answer.wrench
             acting, column = (values, nw) if not stages.actuate else (_acting(k, before, stages, log), 0)
             apply(states, acting, column, log.wrench_world[k])
+            if stages.disturb:
+                _disturb(k, stages, apply, log)
             plant.step()
             block[k - first] = plant.sensed
             if k + 1 - first == len(block) or k + 1 == last:
@@ -146,3 +152,13 @@ def _acting(k: int, wrench: Array, stages: Stages, log: Log) -> Array:
     assert log.acting is not None
     log.acting[k] = wrench
     return wrench
+
+
+def _disturb(k: int, stages: Stages, apply: FreeWrench, log: Log) -> None:
+    """Whatever else happens in a step."""
+    assert log.disturbance is not None
+    for disturb in stages.disturb:
+        added = disturb(k)
+        if added is not None:
+            apply.add(added)
+            log.disturbance[k] += added

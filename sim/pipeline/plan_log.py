@@ -40,8 +40,12 @@ def plan_figures(log: PlanLog) -> dict[str, float]:
 
 
 class Event(NamedTuple):
-    """Something that a user has to know of: in which world, when [s], what."""
+    """Something that a user has to know of: in which world, when [s], what.
+
+    state: of a world that goes over to a safe state from then on, the name of that, else "".
+    """
 
     world: int
     time: float
     what: str
+    state: str = ""

@@ -1,20 +1,28 @@
-"""The stages of a step and what passes between them: sense, observe, control, actuate; one protocol each.
+"""The stages of a step and what passes between them: sense, observe, control, actuate, disturb; one protocol each.
 
-    states -> sense -> observe -> control -> actuate -> plant
+    states -> sense -> observe -> control -> actuate -> disturb -> plant
 
-All stages work on W worlds at once. A stage that is left out costs nothing. Stages may have state, which `prepare` and
+All stages work on W worlds at once. Stages may also stand around the control, and correct the reference that its law
+sees. A stage that is left out costs nothing. Stages may have state, which `prepare` and
 the order of the steps determine; random draws are keyed (see `random_draws`), so that a replayed world is the same.
 """
 
 from collections.abc import Mapping
 from importlib import import_module
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.control_laws import Law
 from pivoting.controller.kernels.compiled_step import STATE
-from pivoting.controller.validate import frozen
+from pivoting.controller.rotations import rotation_matrix
+from pivoting.controller.validate import fail, frozen
+from pivoting.controller.wrench_controller import WrenchController
+
+if TYPE_CHECKING:  # which are built before the stages
+    from mujoco.batch import Batch
+    from pivoting.sim.scenarios.scenario import Scenario
+    from pivoting.sim.world import World
 
 Array = NDArray[np.float64]
 # The columns of a state's values.
@@ -34,13 +42,22 @@ class States:
             more columns may follow, which are no part of the state.
         joint_position: (W, nq) and joint_velocity: (W, nv) of all joints of the model.
         touching: (W,) how many contacts with its support the object has, as touch sensors would tell.
+        fresh: (W,) whether a new measurement has arrived; where not, the values are older, or predicted.
     """
 
-    __slots__ = ("joint_position", "joint_velocity", "touching", "values")
+    __slots__ = ("fresh", "joint_position", "joint_velocity", "touching", "values")
 
-    def __init__(self, values: Array, joint_position: Array, joint_velocity: Array, touching: Array):
+    def __init__(
+        self,
+        values: Array,
+        joint_position: Array,
+        joint_velocity: Array,
+        touching: Array,
+        fresh: NDArray[np.bool_] | None = None,
+    ):
         self.values, self.touching = _shown(values), _shown(touching)
         self.joint_position, self.joint_velocity = _shown(joint_position), _shown(joint_velocity)
+        self.fresh = np.ones(len(values), np.bool_) if fresh is None else fresh
 
     @property
     def position(self) -> Array:
@@ -69,11 +86,19 @@ class States:
     def of(self, worlds: NDArray[np.intp]) -> "States":
         """Those of some worlds, in arrays of their own."""
         joints = self.joint_position[worlds], self.joint_velocity[worlds]
-        return States(self.values[worlds, :STATE], *joints, self.touching[worlds])
+        return States(self.values[worlds, :STATE], *joints, self.touching[worlds], self.fresh[worlds])
 
-    def changed(self, values: Array) -> "States":
-        """The same joints with other values (W, 13) of the object, as something measures or estimates it."""
-        return States(values, self.joint_position, self.joint_velocity, self.touching)
+    def changed(self, values: Array, fresh: NDArray[np.bool_] | None = None) -> "States":
+        """The same joints with other values (W, 13) of the object, as something measures or estimates it.
+
+        Args:
+            fresh: (W,) whether they are newly measured; None: where they were before.
+        """
+        changed = object.__new__(States)  # of what is shown already
+        changed.values, changed.touching = _shown(values), self.touching
+        changed.joint_position, changed.joint_velocity = self.joint_position, self.joint_velocity
+        changed.fresh = self.fresh if fresh is None else fresh
+        return changed
 
     @classmethod
     def turning(cls, orientation: Array, angular_velocity: Array) -> "States":
@@ -199,6 +224,26 @@ class Actuate(Protocol):
         ...
 
 
+class Wrap(Protocol):
+    """What stands around a control, such as one that asks it less often, or that goes over to a safe state."""
+
+    def __call__(self, control: Control, desired: Array) -> Control:
+        """The control that takes its place; `desired`: (N+1, 10) values of `Desired` at every step, as it is told."""
+        ...
+
+
+class Disturb(Protocol):
+    """What happens to the world without anybody's asking for it; neither the control nor an observer knows of it."""
+
+    def begin(self, batch: "Batch", world: "World") -> None:
+        """The worlds in which it will happen, before their first step."""
+        ...
+
+    def __call__(self, k: int) -> Array | None:
+        """Change the worlds in step k; (W, 6) force and torque at the centre of mass, world axes, if any are added."""
+        ...
+
+
 class Setting(NamedTuple):
     """What a stage is built from, beside the value of its key.
 
@@ -207,6 +252,9 @@ class Setting(NamedTuple):
         dt: time step [s].
         axes: (A, 3) world axes about which the object can turn: the plane's normal, or three.
         law: of the controller.
+        case: the scenario, `absolute`, with the values of all keys.
+        controllers: of the first stance, one for each world or one that they share: what is believed.
+        unit: of the model's lengths [m], and with it of its forces and moments.
     """
 
     seed: int
@@ -215,6 +263,36 @@ class Setting(NamedTuple):
     dt: float
     axes: Array
     law: Law
+    case: "Scenario"
+    controllers: tuple[WrenchController, ...]
+    unit: float
+
+    @property
+    def directions(self) -> Array:
+        """(D, 3) world axes along which the object can move: two in the plane, or three."""
+        space = self.controllers[0].space
+        return space.force_map.T @ rotation_matrix(space.base).T if space.dim == 2 else np.eye(3)
+
+    def step(self, name: str, seconds: float) -> int:
+        """The number of steps that a time of the key `name` takes: 0, or at least one.
+
+        Raises:
+            ValueError: it is shorter than a step.
+        """
+        steps = round(seconds / self.dt)
+        if seconds > 0.0 and steps == 0:
+            raise fail(name, seconds, f"0, or at least the time step of {self.dt:g} s")
+        return steps
+
+    def every(self, name: str, rate: float) -> int:
+        """The number of steps from one time to the next at a rate [Hz] of the key `name`.
+
+        Raises:
+            ValueError: the rate is above that of the steps.
+        """
+        if rate * self.dt > 1.0 + 1e-9:
+            raise fail(name, rate, f"at most one for each time step, {1.0 / self.dt:g} Hz")
+        return round(1.0 / (rate * self.dt))
 
 
 class Stages(NamedTuple):
@@ -223,19 +301,26 @@ class Stages(NamedTuple):
     sense: tuple[Sense, ...] = ()
     observe: tuple[Observe, ...] = ()
     correct: tuple[Correct, ...] = ()
+    wrap: tuple[Wrap, ...] = ()
     actuate: tuple[Actuate, ...] = ()
+    disturb: tuple[Disturb, ...] = ()
+
+    def around(self, control: Control, desired: Array) -> Control:
+        """The control with what stands around it, the first innermost; `desired` as of `Wrap`."""
+        for wrap in self.wrap:
+            control = wrap(control, desired)
+        return control
 
 
 def build_stages(values: Mapping[str, float], setting: Setting) -> Stages:
     """The stages that a scenario's keys ask for.
 
     Args:
-        values: by the place of a stage's class, "module:Class"; a value of 0 asks for none.
+        values: by the place of a stage's class, "module:Class", that of the first of its keys that is set.
     """
     built: dict[str, list[Any]] = {slot: [] for slot in Stages._fields}
     for place, value in values.items():
-        if value:
-            module, _, name = place.partition(":")
-            made = getattr(import_module(module), name)(value, setting)
-            built[made.slot].append(made)
+        module, _, name = place.partition(":")
+        made = getattr(import_module(module), name)(value, setting)
+        built[made.slot].append(made)
     return Stages(**{slot: tuple(stages) for slot, stages in built.items()})

@@ -31,20 +31,23 @@ class Needs:
 
     Attributes:
         key: the other key.
-        words: what that has to be, or a function that tells it of the first key's name; None: anything but None.
+        words: what that has to be, or a function that tells it of the first key's name; None: anything but None and 0.
         open_loop: whether the key has an effect in a run in open loop, too.
         said: the condition in words, where `key` is an attribute of the values but no key.
+        instead: other keys, any of which will do as well, if it is set.
     """
 
     key: str
     words: tuple[str, ...] | Callable[[str], tuple[str, ...]] | None = None
     open_loop: bool = False
     said: str = ""
+    instead: tuple[str, ...] = ()
 
     def met(self, name: str, values: object, open_loop: bool) -> bool:
         """Whether the key `name` has an effect among these values, attributes of an object, in open loop or not."""
         value, words = getattr(values, self.key), self.words_of(name)
-        return (open_loop and self.open_loop) or (value is not None if words is None else value in words)
+        others = any(getattr(values, other) for other in self.instead)
+        return (open_loop and self.open_loop) or others or (bool(value) if words is None else value in words)
 
     def words_of(self, name: str) -> tuple[str, ...] | None:
         """The words with one of which the key `name` has an effect."""
@@ -56,7 +59,8 @@ class Needs:
             return self.said
         words = self.words_of(name)
         if words is None:
-            return f"{self.key} is set" + " or the run is in open loop" * self.open_loop
+            keys = " or ".join((self.key, *self.instead))
+            return f"{keys} is set" + " or the run is in open loop" * self.open_loop
         return f"{self.key} is " + " or ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))
 
 
@@ -74,7 +78,8 @@ class Key:
         relative: what a number may be relative to, "w" or "T", see `relative_values.MEANING`; "" if to nothing.
         words: what it may be, if it is a word, each with what it means (as its `str`).
         needs: what it has an effect with; None: it always has one.
-        stage: the class that is built from the value as a stage of the pipeline, "module:Class"; 0 asks for none.
+        stages: the classes that are built from the value as stages of the pipeline, "module:Class"; 0 or None asks for
+            none. Several keys may name one class, which finds the others' values in its `Setting`.
         types: of the field's annotation, such as (float, NoneType).
     """
 
@@ -87,7 +92,7 @@ class Key:
     relative: str = ""
     words: Mapping[str, object] | None = None
     needs: Needs | None = None
-    stage: str | None = None
+    stages: tuple[str, ...] = ()
     types: tuple[Any, ...] = ()
 
     @property
@@ -182,12 +187,13 @@ def key(
     relative: str = "",
     words: Mapping[str, object] | None = None,
     needs: Needs | None = None,
-    stage: str | None = None,
+    stage: str | tuple[str, ...] = (),
 ) -> T:
     """The field of a dataclass that declares a key; see `Key`."""
     bounds = {"above": above, "at_least": at_least, "below": below, "at_most": at_most}
     limits = {name: bound for name, bound in bounds.items() if bound is not None}
-    declared = Key(help, default, group, unit, limits, none, relative, words, needs, stage)
+    stages = (stage,) if isinstance(stage, str) else stage
+    declared = Key(help, default, group, unit, limits, none, relative, words, needs, stages)
     return field(default=default, metadata={_METADATA: declared})
 
 

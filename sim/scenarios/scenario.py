@@ -198,7 +198,12 @@ class Scenario(ScenarioKeys):
     @property
     def stages(self) -> dict[str, float]:
         """The values of the keys that ask for a stage of the pipeline, by the place of its class."""
-        return {key.stage: getattr(self, name) for name, key in self._keys.items() if key.stage is not None}
+        asked: dict[str, float] = {}
+        for name, key in self._keys.items():
+            if value := getattr(self, name):
+                for stage in key.stages:
+                    asked.setdefault(stage, value)
+        return asked
 
     def control_law(self) -> Law:
         """The law; the quasi-dynamic ones take the time constant of `bandwidth` as their step h."""

@@ -6,6 +6,7 @@ from pivoting.controller.control_laws import FORMULATIONS
 from pivoting.controller.planning.integrators import INTEGRATORS
 from pivoting.controller.references import REFERENCES, Reference
 from pivoting.sim.scenarios.key_declaration import Needs, declared_keys, key
+from pivoting.sim.scenarios.loop_keys import LoopKeys
 from pivoting.sim.scenarios.object_keys import OBJECT, SCENE, ObjectKeys
 
 LOWEST = 0.1  # [deg] from a face: closer, the next corner touches the table too
@@ -32,8 +33,8 @@ _PLANS, _PLANS_OR_PLAYS = Needs("plan_hz"), Needs("plan_hz", open_loop=True)
 
 
 @dataclass(frozen=True, kw_only=True)
-class ScenarioKeys(ObjectKeys):
-    """The values of a scenario that `--set` changes. Angles are in degrees here and in radians everywhere else."""
+class IdealKeys(ObjectKeys):
+    """The values of a scenario that `--set` changes, as far as they belong to a loop in which nothing fails."""
 
     reference: str | Reference = key(
         "constant", "motion that the object is to follow", group=REFERENCE, words=REFERENCES
@@ -199,9 +200,9 @@ class ScenarioKeys(ObjectKeys):
         needs=_PLANS_OR_PLAYS,
     )
 
-    shove: float = key(
+    shove_bound: float = key(
         0.0,
-        "greatest impulse of a shove at the centre of mass, in any direction, for each kg",
+        "greatest impulse of a shove that the controller reckons with, in any direction, for each kg",
         group=UNCERTAINTY,
         unit="N s/kg",
         at_least=0.0,
@@ -229,16 +230,6 @@ class ScenarioKeys(ObjectKeys):
         group=UNCERTAINTY,
         words={"drawn": "at random, each by its number and the seed", "vertices": "each vertex in turn"},
         needs=Needs("differing", said="a key of the object is an interval"),
-    )
-
-    noise: float = key(
-        0.0,
-        "greatest error of the measured orientation about each axis, drawn anew in each step",
-        group=STAGES,
-        unit="deg",
-        at_least=0.0,
-        at_most=10.0,
-        stage="pivoting.sim.pipeline.measurement_noise:MeasurementNoise",
     )
 
     integral: float = key(
@@ -277,6 +268,11 @@ class ScenarioKeys(ObjectKeys):
         None, "ratio of the contact's impedance along the support to that across it",
         group=SIMULATOR, above=0.0, at_most=1e9, none=SCENE,
     )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScenarioKeys(LoopKeys, IdealKeys):
+    """The values of a scenario that `--set` changes. Angles are in degrees here and in radians everywhere else."""
 
 
 KEYS = declared_keys(ScenarioKeys)

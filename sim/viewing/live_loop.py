@@ -83,6 +83,8 @@ class LiveLoop:
         self._batch, self._plant = batch, Plant(batch, self._whole.world.sensors)
         wrench_map = self._whole.belief.attached.controller.belief.source.map
         self._apply = PushedWrench(batch, wrench_map, self._whole.world.truth.index, self._whole.world.offsets)
+        for disturb in self._stages.disturb:
+            disturb.begin(batch, self._whole.world)
 
     def _begin_cycle(self) -> None:
         """The scenario's own motion from its beginning, in as many laps as it takes."""
@@ -218,7 +220,8 @@ class LiveLoop:
             desired=_cut(self._begun.desired, states),
         )
         log = worlds_first(some_steps(self._steps.log, first, last))
-        return kept(begun, self._decided, (self._start, log, self._wall_s), self._whole.world.warned)
+        made = self._start, log, self._wall_s
+        return kept(begun, self._decided, made, self._decided.events, self._whole.world.warned)
 
     def go_to(self, theta: float) -> None:
         """Move smoothly to an angle [deg], whatever the motion is now, and stay there.
