@@ -1,0 +1,166 @@
+"""Identification: what a whole log tells of each parameter, by which measurement, and what it cannot tell, and why."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+from pivoting.controller.learning.balances import Balances, Cuts
+from pivoting.controller.learning.friction import FrictionBounds, friction_bounds
+from pivoting.controller.learning.least_squares import RecursiveLeastSquares
+from pivoting.controller.learning.motion_log import SLIDES, MeasurementErrors, MotionLog
+from pivoting.controller.learning.parameters import Parameter, Seen, narrower, parameters
+from pivoting.controller.learning.polytope import Polytope
+from pivoting.controller.learning.set_membership import SetMembership
+from pivoting.controller.learning.unknowns import Unknowns
+from pivoting.controller.learning.windows import Window, windows
+from pivoting.controller.rotations import rotation_matrix
+from pivoting.controller.uncertainty.uncertainty import Interval, Uncertainty
+from pivoting.controller.validate import Array, fail, frozen
+
+ANY = Interval(0.0, np.inf)  # friction coefficient of which nothing is known
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """What a log tells of the object.
+
+    Attributes:
+        parameters: each with its interval before and after.
+        uncertainty: the set for the controller, once it takes the centre of mass to be `shift` from where it did. It is
+            made of independent intervals, and larger than `set`: in that, mass and centre of mass hang together by
+            their product, which is known better than either, and the inertia with both of them.
+        shift: (d,) to the middle of where the centre of mass may be, object axes [m].
+        set: all values of the `unknowns` that no measurement excludes.
+        resets: how often measurements contradicted each other, the prior, or their bounds: some bound is wrong then,
+            and nothing is guaranteed.
+        cuts: how many pairs of half-spaces the set was intersected with.
+    """
+
+    parameters: tuple[Parameter, ...]
+    uncertainty: Uncertainty
+    shift: Array
+    unknowns: Unknowns
+    set: Polytope
+    resets: int
+    cuts: int
+
+    @property
+    def consistent(self) -> bool:
+        """Whether the measurements agree with the prior and with the bounds on their errors."""
+        return self.resets == 0
+
+
+def identify(log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns, *, several: bool = False) -> Identification:
+    """Learn from a log by both estimators, first from its motion and then from its contact forces, if it has any.
+
+    Args:
+        several: whether the contact force is a sum over several contacts, see `friction_bounds`.
+
+    Raises:
+        ValueError: there is too little in the log to learn from.
+    """
+    estimator, squares = SetMembership(unknowns), RecursiveLeastSquares(unknowns)
+    stages, seen, count = [estimator.set], [], 0
+    for make in (moment_cuts, force_cuts):
+        most = np.zeros(len(estimator.prior.low))
+        for cuts in make(log, errors, estimator.farthest):
+            count += len(cuts.values)
+            most = np.maximum(most, _visible(unknowns, cuts, estimator.prior))
+            squares.update(cuts)
+            estimator.update(cuts)
+        seen.append(most)
+        stages.append(estimator.set)
+    if count == 0:
+        raise fail("log", f"{log.steps} steps", "at least 16 steps on end in which the contact sticks")
+    friction, contradicted = _friction(log, errors, unknowns, several)
+    found = parameters(unknowns, (stages[0], stages[1], stages[2]), squares.mean, Seen(*seen))
+    uncertainty, shift = _for_the_controller(unknowns, found, friction)
+    resets = estimator.resets + contradicted
+    return Identification((*found, friction), uncertainty, shift, unknowns, estimator.set, resets, count)
+
+
+def moment_cuts(log: MotionLog, errors: MeasurementErrors, farthest: float) -> list[Cuts]:
+    """The cuts of all windows in which the contact sticks, those of one length together; the longest first.
+
+    Args:
+        farthest: a bound on the first moment [kg m].
+    """
+    balances, found = Balances(log, errors, farthest), windows(log.sticking)
+    cuts = _grouped(found, balances.moments)
+    return cuts if log.angular_velocity is None else cuts + _grouped(found, balances.rates)
+
+
+def force_cuts(log: MotionLog, errors: MeasurementErrors, farthest: float) -> list[Cuts]:
+    """Likewise, of all windows in which all forces are known."""
+    return _grouped(windows(log.weighed), Balances(log, errors, farthest).forces)
+
+
+def _grouped(found: list[Window], make: Callable[[Window], Cuts]) -> list[Cuts]:
+    lengths = groupby(found, key=lambda window: window.last - window.first)
+    return [Cuts.together([make(window) for window in group]) for _, group in lengths]
+
+
+def _visible(unknowns: Unknowns, cuts: Cuts, prior: Polytope) -> Array:
+    """(n,) by how much each unknown could change a balance, over its error, at most; see `Seen`."""
+    middle = 0.5 * (prior.low + prior.high)
+    error = unknowns.select(cuts.spreads) @ middle + cuts.errors
+    changes = np.abs(unknowns.select(cuts.rows)) * (prior.high - prior.low)
+    return (changes / np.maximum(error, 1e-12 * changes.max() + 1e-300)[:, None]).max(axis=0)
+
+
+def _friction(
+    log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns, several: bool
+) -> tuple[Parameter, int]:
+    """The friction coefficient, and 1 where its bounds contradict the prior, else 0."""
+    before = unknowns.prior.mu or ANY
+    normal = rotation_matrix(log.space.base)[:, 2]
+    bounds = friction_bounds(log, normal, errors.contact_force, several=several)
+    after = bounds.within(before)
+    if after is None:
+        told = f"at least {bounds.used:.3g} was used without a slip, and at most {bounds.slipped:.3g} in one"
+        return Parameter("mu", "", before, before, None, f"contradicts the prior: {told}", False), 1
+    told = narrower(before, after)
+    return Parameter("mu", "", before, after, None, _why_friction(log, bounds, before, several), told), 0
+
+
+def _why_friction(log: MotionLog, bounds: FrictionBounds, before: Interval, several: bool) -> str:
+    said = []
+    if bounds.used > before.low:
+        said.append("friction that was used without a slip")
+    if bounds.slipped < before.high:
+        said.append("a slip")
+    if said:
+        return " and ".join(said)
+    if np.isnan(log.contact_force).all():
+        return "it takes a contact force"
+    if several and (log.contact == SLIDES).any():
+        return "several contacts may slip in different directions"
+    return "no slip, and no more friction was used than was known to be there"
+
+
+def _for_the_controller(
+    unknowns: Unknowns, found: tuple[Parameter, ...], friction: Parameter
+) -> tuple[Uncertainty, Array]:
+    """The intervals as a set, about the middle of where the centre of mass may be, and that middle."""
+    prior, after = unknowns.prior, {each.name: each.after for each in found}
+    coms = np.array([after[name.removeprefix("m ")] for name in unknowns.moments])
+    shift = coms.mean(axis=1)
+    set_ = Uncertainty(
+        mass=after["mass"],
+        com=coms - shift[:, None],
+        inertia=after["inertia"],
+        mu=None if prior.mu is None and friction.after == ANY else _finite(friction.after),
+        shove=prior.shove,
+        shove_seconds=prior.shove_seconds,
+        theta=prior.theta,
+        omega=prior.omega,
+    )
+    return set_, frozen(shift)
+
+
+def _finite(mu: Interval) -> Interval | None:
+    """Of a set only the lower bound of the friction matters: without an upper one it stands for both."""
+    if mu.low == 0.0:
+        return None
+    return mu if np.isfinite(mu.high) else Interval(mu.low, mu.low)
