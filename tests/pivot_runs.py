@@ -1,10 +1,12 @@
-"""Objects that turn about a point that stays where it is: their motion by integration, and a log of it with errors.
+"""Objects that turn about a point that stays where it is: their motion by integration, and logs of it with errors.
 
 Nothing here is taken from what is tested: the equations of motion are Euler's about the contact, in object axes,
-integrated by the method of Runge and Kutta. The plane is space with everything in the plane of x and z.
+integrated by the method of Runge and Kutta, many runs at a time. The plane is space with everything in that of x and z.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from pivoting.controller.learning.motion_log import MeasurementErrors, MotionLog, motion_log
@@ -14,8 +16,36 @@ from pivoting.controller.rotations import CONJUGATE, exponential, quaternion_pro
 from pivoting.controller.uncertainty.uncertainty import Member, Uncertainty
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
-BANDWIDTH = 15.0  # of the law that makes the motion, times the natural frequency's inverse
+IN_PLANE = np.array([1.0, 0.0, 1.0])
+STEPS = 400
+SHOVE_SECONDS = 0.05
 FORCE_ERROR = 0.01  # of a measured contact force, in weights
+START, TURN = np.deg2rad(10.0), np.deg2rad(70.0)
+
+
+class Drawn(NamedTuple):
+    """W objects: what is known beforehand, the truth, and how they are moved.
+
+    Attributes:
+        unknowns, members: of each.  mass: (W,).  com: (W, 3) from the contact.  inertia: (W, 3, 3) about it.
+        believed: mass, first moment and inertia about the contact as they are believed.
+        lever: (W, 3) to the believed CoM.  dt: (W,).  axis: (W, 3) of the turn.
+        pushed: (W, STEPS, 3) shoves at the true CoM.  fixed: (W,) whether a wrench turns with the object in a step.
+        squeeze: (W, 3) force of the known wrench.
+    """
+
+    unknowns: list[Unknowns]
+    members: list[Member]
+    mass: np.ndarray
+    com: np.ndarray
+    inertia: np.ndarray
+    believed: tuple[np.ndarray, np.ndarray, np.ndarray]
+    lever: np.ndarray
+    dt: np.ndarray
+    axis: np.ndarray
+    pushed: np.ndarray
+    fixed: np.ndarray
+    squeeze: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,140 +59,158 @@ class PivotRun:
     member: Member
 
 
-def pivot_run(rng: np.random.Generator, dim: int, shove: float = 0.2, omega: float = 0.0) -> PivotRun:
-    """A box turned from 10 to 80 deg about its corner, of random sides, mass, truth, duration, errors and shove."""
-    sides = 10.0 ** rng.uniform(-1.0, 0.0) * rng.uniform(0.5, 1.0, 3)
-    mass = 500.0 * sides.prod() * rng.uniform(0.5, 2.0)
-    tensor = mass / 12.0 * np.diag((sides**2).sum() - sides**2)
-    used = [0, 2] if dim == 2 else [0, 1, 2]
-    prior = Uncertainty(
-        mass=(0.8 * mass, 1.2 * mass),
-        com=np.outer(0.05 * sides[used], [-1.0, 1.0]),
-        inertia=(0.8, 1.2),
-        mu=(0.25, 0.8),
-        shove=shove,
-        theta=np.deg2rad(0.1),
-        omega=omega,
-    )
-    ends = rng.random() < 0.5
-    member = prior.at(rng.integers(0, 2, 3 + dim) if ends else rng.random(3 + dim))
-    if dim == 2:
-        tensor = np.diag([0.0, tensor[1, 1], 0.0])
-    lever = 0.5 * sides * (1.0 if dim == 3 else np.array([1.0, 0.0, 1.0]))
-    unknowns = Unknowns(space(dim), lever, tensor, prior)
-    offset = space(dim).lift(np.asarray(member.com))
-    motion = _motion(rng, unknowns, member, offset, shove)
-    return _measured(rng, unknowns, member, motion)
+def pivot_runs(seed: int, count: int, dim: int, shove: float = 0.2, omega: float = 0.0) -> Iterator[PivotRun]:
+    """Boxes turned from 10 to 80 deg about a corner: random sides, masses, truths, durations, errors and shoves.
+
+    Half of the truths are vertices of the set, half of the errors are as large as they may be, a third a mere bias.
+
+    Args:
+        shove: greatest impulse [N s/kg].  omega: greatest error of a measured rate; 0: rates are not measured [rad/s].
+    """
+    rng = np.random.default_rng([seed, dim])
+    drawn = _drawn(rng, count, dim, shove, omega)
+    orientation, rates, wrenches = _motion(drawn)
+    for i in range(count):
+        yield _measured(rng, drawn, i, orientation[:, i], rates[:, i], wrenches[:, i])
 
 
-def _motion(rng, unknowns, member, offset, shove):
-    """Time, orientation, body rate and the wrench of each step, which acts at the believed CoM."""
-    J, h = _tensor(unknowns, member.mass, offset, member.inertia)
-    J0, h0 = _tensor(unknowns, unknowns.prior.nominal.mass, np.zeros(3), 1.0)
-    planar, lever = unknowns.space.dim == 2, unknowns.lever
-    natural = np.sqrt(np.linalg.norm(lever) / 9.81)
-    seconds, steps = natural * rng.uniform(6.0, 10.0), int(rng.integers(300, 700))
-    dt = seconds / steps
-    azimuth = 0.0 if planar else rng.uniform(-np.pi, np.pi)
-    axis = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
-    start = exponential(np.deg2rad(10.0) * axis)
-    gain = BANDWIDTH / natural / 3.0
-    pushed = rng.normal(size=3) * (np.array([1.0, 0.0, 1.0]) if planar else 1.0)
-    lasting, begin = max(1, round(0.05 / dt)), int(rng.integers(0, steps // 2))  # [steps]
-    pushed *= member.mass * shove * rng.choice([0.5, 1.0]) / np.linalg.norm(pushed) / (lasting * dt)
-    q, omega, squeeze = start, np.zeros(3), rng.normal(size=3) * (np.array([1.0, 0.0, 1.0]) if planar else 1.0)
-    orientation, rates, wrenches = [q], [omega], []
-    fixed = rng.random() < 0.5  # to the object, else to the world
+def _drawn(rng: np.random.Generator, count: int, dim: int, shove: float, omega: float) -> Drawn:
+    planar = dim == 2
+    used = IN_PLANE if planar else np.ones(3)
+    rows: list[Any] = []
+    for _ in range(count):
+        sides = 10.0 ** rng.uniform(-1.0, 0.0) * rng.uniform(0.5, 1.0, 3)
+        mass = 500.0 * sides.prod() * rng.uniform(0.5, 2.0)
+        tensor = mass / 12.0 * np.diag((sides**2).sum() - sides**2)
+        tensor = np.diag([0.0, tensor[1, 1], 0.0]) if planar else tensor
+        box = np.outer(0.05 * sides[used > 0.0], [-1.0, 1.0])
+        prior = Uncertainty(
+            mass=(0.8 * mass, 1.2 * mass), com=box, inertia=(0.8, 1.2), shove=shove, theta=np.deg2rad(0.1), omega=omega
+        )
+        member = prior.at(rng.integers(0, 2, 3 + dim) if rng.random() < 0.5 else rng.random(3 + dim))
+        unknowns = Unknowns(space(dim), 0.5 * sides * used, tensor, prior)
+        com = unknowns.lever + unknowns.space.lift(np.asarray(member.com))
+        dt = np.sqrt(np.linalg.norm(unknowns.lever) / 9.81) * rng.uniform(6.0, 10.0) / STEPS
+        azimuth = 0.0 if planar else rng.uniform(-np.pi, np.pi)
+        pushed, lasting = np.zeros((STEPS, 3)), max(1, round(SHOVE_SECONDS / dt))
+        push = rng.normal(size=3) * used
+        begin = int(rng.integers(0, STEPS - lasting))
+        impulse = member.mass * shove * rng.choice([0.5, 1.0])
+        pushed[begin : begin + lasting] = impulse * push / np.linalg.norm(push) / (lasting * dt)
+        J = _about(member.mass, com, member.inertia * tensor)
+        believed = mass, mass * unknowns.lever, _about(mass, unknowns.lever, tensor)
+        axis = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
+        squeeze = 9.81 * mass * rng.uniform(-0.5, 0.5, 3) * used
+        rows.append(
+            (unknowns, member, member.mass, com, J, believed, unknowns.lever, dt, axis, pushed, rng.random() < 0.5, squeeze)
+        )
+    columns = list(zip(*rows, strict=True))
+    known = tuple(np.array(each) for each in zip(*columns[5], strict=True))
+    arrays = [np.array(each) for each in columns[2:5]]
+    return Drawn(list(columns[0]), list(columns[1]), *arrays, known, *(np.array(each) for each in columns[6:]))
 
-    def turning(q, omega, F, M, R0, k):
-        """Of body rates, by the moments about the contact, all in object axes."""
-        if not fixed:
-            F, M = (rotated(q * CONJUGATE, rotated(R0, each)) for each in (F, M))
-        moment = M + np.cross(lever, F) + np.cross(h, rotated(q * CONJUGATE, GRAVITY))
-        if begin <= k < begin + lasting:
-            moment += np.cross(lever + offset, rotated(q * CONJUGATE, pushed))
-        moment -= np.cross(omega, J @ omega)
-        return np.array([0.0, moment[1] / J[1, 1], 0.0]) if planar else np.linalg.solve(J, moment)
 
-    for k in range(steps):
-        t = k * dt
-        u = t / seconds
-        angle = np.deg2rad(70.0) * u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
-        rate = np.deg2rad(70.0) * 30.0 * u**2 * (1.0 - u) ** 2 / seconds
-        push = np.deg2rad(70.0) * 60.0 * u * (1.0 - 3.0 * u + 2.0 * u * u) / seconds**2
-        wanted = quaternion_product(exponential(angle * axis), start)
-        off = quaternion_product(wanted, q * CONJUGATE)
-        error = 2.0 * off[1:] * np.sign(off[0])
+def _about(mass: float, c: np.ndarray, tensor: np.ndarray) -> np.ndarray:
+    return tensor + mass * (c @ c * np.eye(3) - np.outer(c, c))
+
+
+def _motion(drawn: Drawn) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Orientations and body rates (STEPS + 1, W, ...), and wrenches (STEPS, W, 6) at the believed CoM, object axes."""
+    planar = drawn.unknowns[0].space.dim == 2
+    solve = np.array([np.diag([0.0, 1.0 / J[1, 1], 0.0]) if planar else np.linalg.inv(J) for J in drawn.inertia])
+    _, h0, J0 = drawn.believed
+    seconds, axis, lever = STEPS * drawn.dt[:, None], drawn.axis, drawn.lever
+    start = exponential(START * axis)
+    gain = 5.0 * np.sqrt(9.81 / np.linalg.norm(lever, axis=1))[:, None]
+    q, omega = start, np.zeros_like(axis)
+    found: tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]] = [q], [omega], []
+    for k in range(STEPS):
+        u = k / STEPS
+        angle = TURN * u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
+        rate = TURN * 30.0 * u**2 * (1.0 - u) ** 2 / seconds
+        push = TURN * 60.0 * u * (1.0 - 3.0 * u + 2.0 * u * u) / seconds**2
+        off = quaternion_product(quaternion_product(exponential(angle * axis), start), q * CONJUGATE)
+        error = 2.0 * off[:, 1:] * np.sign(off[:, :1])
         alpha = push * axis + gain**2 * error + 2.0 * gain * (rate * axis - rotated(q, omega))
-        moment = J0 @ rotated(q * CONJUGATE, alpha) + np.cross(omega, J0 @ omega)
+        moment = _times(J0, rotated(q * CONJUGATE, alpha)) + np.cross(omega, _times(J0, omega))
         moment -= np.cross(h0, rotated(q * CONJUGATE, GRAVITY))
-        F = unknowns.prior.nominal.mass * 3.0 * squeeze
-        M = moment - np.cross(lever, F)
-        wrenches.append(np.concatenate([F, M]))
-        q, omega = _rk4(turning, q, omega, F, M, k, dt)
-        orientation.append(q)
-        rates.append(omega)
-    acting = (np.arange(steps) >= begin) & (np.arange(steps) < begin + lasting)
-    found = np.array(orientation), np.array(rates), np.array(wrenches)
-    return dt * np.arange(steps + 1), *found, (lever + offset, fixed, np.outer(acting, pushed))
+        wrench = np.hstack([drawn.squeeze, moment - np.cross(lever, drawn.squeeze)])
+        q, omega = _rk4(drawn, solve, q, omega, wrench, drawn.pushed[:, k])
+        for values, value in zip(found, (q, omega, wrench), strict=True):
+            values.append(value)
+    return np.array(found[0]), np.array(found[1]), np.array(found[2])
 
 
-def _tensor(unknowns, mass, offset, factor):
-    c = unknowns.lever + offset
-    J = factor * unknowns.inertia + mass * (c @ c * np.eye(3) - np.outer(c, c))
-    return J, mass * c
+def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    return np.einsum("wij,wj->wi", matrices, vectors)
 
 
-def _rk4(turning, q, omega, F, M, k, dt):
-    def slopes(p, w):
-        return 0.5 * quaternion_product(p, np.append(0.0, w)), turning(p, w, F, M, q, k)
+def _rk4(drawn: Drawn, solve: np.ndarray, q: np.ndarray, omega: np.ndarray, wrench: np.ndarray, push: np.ndarray) -> Any:
+    """One step with a wrench that is fixed to the objects or to the world."""
+    F, M = rotated(q, wrench[:, :3]), rotated(q, wrench[:, 3:])
+    first_moment = drawn.mass[:, None] * drawn.com
 
+    def slopes(p: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        back = p * CONJUGATE
+        force, moment = (
+            np.where(drawn.fixed[:, None], own, rotated(back, world))
+            for own, world in ((wrench[:, :3], F), (wrench[:, 3:], M))
+        )
+        total = moment + np.cross(drawn.lever, force) + np.cross(first_moment, rotated(back, GRAVITY))
+        total += np.cross(drawn.com, rotated(back, push)) - np.cross(w, _times(drawn.inertia, w))
+        spin = np.concatenate([np.zeros((len(w), 1)), w], axis=1)
+        return 0.5 * quaternion_product(p, spin), _times(solve, total)
+
+    dt = drawn.dt[:, None]
     a = slopes(q, omega)
     b = slopes(q + 0.5 * dt * a[0], omega + 0.5 * dt * a[1])
     c = slopes(q + 0.5 * dt * b[0], omega + 0.5 * dt * b[1])
     d = slopes(q + dt * c[0], omega + dt * c[1])
     p, w = (x + dt / 6.0 * (e + 2.0 * f + 2.0 * g + h) for x, e, f, g, h in zip((q, omega), a, b, c, d, strict=True))
-    return p / np.linalg.norm(p), w
+    return p / np.linalg.norm(p, axis=1, keepdims=True), w
 
 
-def _measured(rng, unknowns, member, motion) -> PivotRun:
-    time, orientation, rates, wrenches, (com, fixed, push) = motion
-    prior, here = unknowns.prior, unknowns.space
-    planar = here.dim == 2
-    eps = prior.theta.high
-    wrong = _wrong(rng, eps, (len(time), 3))
-    if rng.random() < 0.3:
-        wrong = np.broadcast_to(wrong[0], wrong.shape)  # a bias
+def _measured(
+    rng: np.random.Generator, drawn: Drawn, i: int, orientation: np.ndarray, rates: np.ndarray, wrenches: np.ndarray
+) -> PivotRun:
+    unknowns, member = drawn.unknowns[i], drawn.members[i]
+    prior, here, time = unknowns.prior, unknowns.space, drawn.dt[i] * np.arange(STEPS + 1)
+    wrong = _wrong(rng, prior.theta.high, (STEPS + 1, 3))
+    if rng.random() < 1.0 / 3.0:
+        wrong = np.broadcast_to(wrong[0], wrong.shape)
     seen = quaternion_product(exponential(wrong), orientation)
-    seen = here.angle(orientation) + wrong[:, 0] if planar else seen / np.linalg.norm(seen, axis=1, keepdims=True)
     spin = rotated(orientation, rates)
-    rate_error = prior.omega.high
-    measured = spin + _wrong(rng, rate_error, spin.shape)
-    # the mean contact force of each step, by the change of momentum
+    measured = spin + _wrong(rng, prior.omega.high, spin.shape)
     weight = member.mass * 9.81
-    change = np.diff(member.mass * np.cross(spin, rotated(orientation, com)), axis=0) / np.diff(time)[:, None]
-    held = rotated(orientation[:-1], wrenches[:, :3])
-    if fixed:
-        half = quaternion_product(orientation[:-1], exponential(0.25 * np.diff(time)[:, None] * (rates[1:] + rates[:-1])))
-        held = rotated(half, wrenches[:, :3])
-    force = change - member.mass * GRAVITY - held - push
-    error = FORCE_ERROR * weight
-    noisy = force + _wrong(rng, error / np.sqrt(3.0), force.shape)
+    force = _contact_force(drawn, i, orientation, rates, wrenches)
+    noisy = force + _wrong(rng, FORCE_ERROR * weight / np.sqrt(3.0), force.shape)
+    planar = here.dim == 2
     log = motion_log(
         time,
-        seen,
+        here.angle(orientation) + wrong[:, 0] if planar else seen / np.linalg.norm(seen, axis=1, keepdims=True),
         wrenches @ here.wrench_map.T,
         unknowns.lever[unknowns.axes],
         GRAVITY,
-        angular_velocity=None if rate_error == 0.0 else measured @ here.axial(1.0) if planar else measured,
+        angular_velocity=None if prior.omega.high == 0.0 else measured @ here.axial(1.0) if planar else measured,
         contact_force=noisy[:, unknowns.axes],
     )
-    fastest = float(np.linalg.norm(rates, axis=1).max()) * 1.01
-    errors = MeasurementErrors.of(prior, rate=fastest, contact_force=error)
+    fastest = 1.01 * float(np.linalg.norm(rates, axis=1).max())
+    errors = MeasurementErrors.of(prior, rate=fastest, contact_force=FORCE_ERROR * weight)
     return PivotRun(log, errors, unknowns, unknowns.of(member.mass, member.com, member.inertia), member)
 
 
-def _wrong(rng, size, shape):
+def _contact_force(
+    drawn: Drawn, i: int, orientation: np.ndarray, rates: np.ndarray, wrenches: np.ndarray
+) -> np.ndarray:
+    """(STEPS, 3) the mean in each step, by the change of momentum, world axes."""
+    dt, mass = drawn.dt[i], drawn.mass[i]
+    momentum = mass * np.cross(rotated(orientation, rates), rotated(orientation, drawn.com[i]))
+    middle = quaternion_product(orientation[:-1], exponential(0.25 * dt * (rates[1:] + rates[:-1])))
+    held = rotated(middle if drawn.fixed[i] else orientation[:-1], wrenches[:, :3])
+    return np.diff(momentum, axis=0) / dt - mass * GRAVITY - held - drawn.pushed[i]
+
+
+def _wrong(rng: np.random.Generator, size: float, shape: tuple[int, ...]) -> np.ndarray:
     """Errors of up to this size, half of the time all of this size."""
     drawn = rng.uniform(-size, size, shape)
     return drawn if rng.random() < 0.5 else size * np.sign(drawn)

@@ -16,7 +16,7 @@ from typing import Self
 
 import numpy as np
 from pivoting.controller.learning.motion_log import MeasurementErrors, MotionLog, world_force, world_moment
-from pivoting.controller.learning.unknowns import COUNT, ENTRIES, MASS, MOMENT
+from pivoting.controller.learning.unknowns import COUNT, ENTRIES, MASS, MOMENT, Unknowns
 from pivoting.controller.learning.windows import Weights, Window, weights
 from pivoting.controller.rotations import rotation_matrix
 from pivoting.controller.validate import Array
@@ -52,11 +52,11 @@ class Balances:
     """The balances of one log, from which windows make cuts.
 
     Args:
-        farthest: a bound on |h| [kg m].
+        unknowns: of the object.
     """
 
-    def __init__(self, log: MotionLog, errors: MeasurementErrors, farthest: float):
-        self._log, self._errors, self._farthest = log, errors, farthest
+    def __init__(self, log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns):
+        self._log, self._errors, self._farthest = log, errors, unknowns.farthest
         self._turn = errors.theta * np.sqrt(1.0 if log.space.dim == 2 else 3.0)  # angle of an error of orientation
         self._R = np.array([rotation_matrix(q) for q in log.orientation])
         self._moment, self._force = world_moment(log), world_force(log)
@@ -74,8 +74,9 @@ class Balances:
         along = log.axes @ self._moment[steps].T  # (A, n)
         spreads[:, self._size] = self._momentum_error(w)
         turned = self._turn * w.size.sum() + self._between(w)
-        lever = self._farthest * (np.linalg.norm(np.cross(log.gravity, log.axes), axis=1) * turned + errors.shove)
-        error = lever + np.abs(along) @ (0.5 * w.duration**2 * np.abs(w.slope) + errors.wrench * w.size)
+        heavy = np.linalg.norm(np.cross(log.gravity, log.axes), axis=1) * turned + errors.shove
+        spreads += heavy[:, None] * self._farthest
+        error = np.abs(along) @ (0.5 * w.duration**2 * np.abs(w.slope) + errors.wrench * w.size)
         return Cuts(rows, along @ w.step, spreads, error + self._turned_moments(w, steps, along))
 
     def forces(self, window: Window) -> Cuts:
@@ -90,7 +91,8 @@ class Balances:
         rows[:, MOMENT] = axes @ turns
         rows[:, MASS] = -w.step.sum() * axes @ log.gravity
         total = np.abs(kinks).sum()
-        spreads[:, MASS] = errors.shove
+        spreads += self._turn * total * self._farthest
+        spreads[:, MASS] += errors.shove
         if log.position is not None:  # of the contact, which may move: p - R lever
             rows[:, MASS] += axes @ (kinks @ log.position[corners] - turns @ log.lever)
             spreads[:, MASS] += total * (errors.position + self._turn * float(np.linalg.norm(log.lever)))
@@ -98,7 +100,7 @@ class Balances:
         size = np.linalg.norm(known, axis=1)
         late = (size + np.linalg.norm(log.contact_force[steps], axis=1)) @ (0.5 * w.duration**2 * np.abs(w.slope))
         turned = size @ (w.size * (self._turn + errors.rate * w.duration))
-        error = late + errors.wrench * size @ w.size + turned + self._farthest * self._turn * total + errors.contact_force * w.size.sum()
+        error = late + errors.wrench * size @ w.size + turned + errors.contact_force * w.size.sum()
         values = (known + log.contact_force[steps]).T @ w.step
         return Cuts(rows, axes @ values, spreads, np.full(len(axes), error))
 
@@ -122,10 +124,11 @@ class Balances:
         planar = log.space.dim == 2
         spreads[:, self._size] = 2.0 * (self._rate_error + (0.0 if planar else 2.0 * self._turn * errors.rate))
         turned = self._turn * w.size.sum() + self._between(w)
-        lever = self._farthest * (np.linalg.norm(np.cross(log.gravity, log.axes), axis=1) * turned + errors.shove)
+        heavy = np.linalg.norm(np.cross(log.gravity, log.axes), axis=1) * turned + errors.shove
+        spreads += heavy[:, None] * self._farthest
         late = 0.5 * (np.abs(along[:, 0]) * duration[0] + np.abs(along[:, -1]) * duration[-1])
         late += 0.5 * np.abs(np.diff(along, axis=1)) @ np.minimum(duration[1:], duration[:-1])
-        error = lever + late + errors.wrench * np.abs(along) @ duration
+        error = late + errors.wrench * np.abs(along) @ duration
         return Cuts(rows, along @ duration, spreads, error + self._turned_moments(w, steps, along))
 
     @property

@@ -9,7 +9,7 @@ from pivoting.controller.learning.balances import Balances, Cuts
 from pivoting.controller.learning.friction import FrictionBounds, friction_bounds
 from pivoting.controller.learning.least_squares import RecursiveLeastSquares
 from pivoting.controller.learning.motion_log import SLIDES, MeasurementErrors, MotionLog
-from pivoting.controller.learning.parameters import Parameter, Seen, narrower, parameters
+from pivoting.controller.learning.parameters import Parameter, Seen, com_of, narrower, parameters
 from pivoting.controller.learning.polytope import Polytope
 from pivoting.controller.learning.set_membership import SetMembership
 from pivoting.controller.learning.unknowns import Unknowns
@@ -64,7 +64,7 @@ def identify(log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns, *, s
     stages, seen, count = [estimator.set], [], 0
     for make in (moment_cuts, force_cuts):
         most = np.zeros(len(estimator.prior.low))
-        for cuts in make(log, errors, estimator.farthest):
+        for cuts in make(log, errors, unknowns):
             count += len(cuts.values)
             most = np.maximum(most, _visible(unknowns, cuts, estimator.prior))
             squares.update(cuts)
@@ -80,20 +80,16 @@ def identify(log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns, *, s
     return Identification((*found, friction), uncertainty, shift, unknowns, estimator.set, resets, count)
 
 
-def moment_cuts(log: MotionLog, errors: MeasurementErrors, farthest: float) -> list[Cuts]:
-    """The cuts of all windows in which the contact sticks, those of one length together; the longest first.
-
-    Args:
-        farthest: a bound on the first moment [kg m].
-    """
-    balances, found = Balances(log, errors, farthest), windows(log.sticking)
+def moment_cuts(log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns) -> list[Cuts]:
+    """The cuts of all windows in which the contact sticks, those of one length together; the longest first."""
+    balances, found = Balances(log, errors, unknowns), windows(log.sticking)
     cuts = _grouped(found, balances.moments)
     return cuts if log.angular_velocity is None else cuts + _grouped(found, balances.rates)
 
 
-def force_cuts(log: MotionLog, errors: MeasurementErrors, farthest: float) -> list[Cuts]:
+def force_cuts(log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns) -> list[Cuts]:
     """Likewise, of all windows in which all forces are known."""
-    return _grouped(windows(log.weighed), Balances(log, errors, farthest).forces)
+    return _grouped(windows(log.weighed), Balances(log, errors, unknowns).forces)
 
 
 def _grouped(found: list[Window], make: Callable[[Window], Cuts]) -> list[Cuts]:
@@ -144,7 +140,7 @@ def _for_the_controller(
 ) -> tuple[Uncertainty, Array]:
     """The intervals as a set, about the middle of where the centre of mass may be, and that middle."""
     prior, after = unknowns.prior, {each.name: each.after for each in found}
-    coms = np.array([after[name.removeprefix("m ")] for name in unknowns.moments])
+    coms = np.array([after[com_of(name)] for name in unknowns.moments])
     shift = coms.mean(axis=1)
     set_ = Uncertainty(
         mass=after["mass"],

@@ -10,8 +10,8 @@ from pivoting.controller.rotations import rotated
 from pivoting.controller.uncertainty.uncertainty import Interval, Uncertainty
 from pivoting.controller.validate import Array, array, fail, frozen, number, unit_quaternions
 
-CONTACT = ("sticks", "slides", "open")
-STICKS, SLIDES, OPEN = range(len(CONTACT))
+CONTACT = ("sticks", "slides", "open", "other")  # "other": more touches than is known, and nothing can be learned
+STICKS, SLIDES, OPEN, OTHER = range(len(CONTACT))
 SHORT_SPAN = 0.05  # [s] over which a rate of turn is taken from orientations
 
 
@@ -72,7 +72,7 @@ class MotionLog:
         angular_velocity: (N+1, 3) measured, world axes [rad/s]; None: not measured.
         contact_force: (N, 3) sum of the contact forces on the object, world axes [N]; nan: not measured in that step.
         position: (N+1, 3) measured, of the point at which the wrench acts, world axes [m]; None: not measured.
-        contact: (N,) what the contact does in each step: `STICKS`, `SLIDES` or `OPEN`.
+        contact: (N,) what the contact does in each step: one of `CONTACT`, by number.
     """
 
     space: Space
@@ -97,7 +97,7 @@ class MotionLog:
     def weighed(self) -> NDArray[np.bool_]:
         """(N,) in which steps all forces are known, and where the contact is."""
         known = np.isfinite(self.contact_force).all(axis=1)
-        return known if self.position is not None else known & self.sticking
+        return known & (self.sticking if self.position is None else self.contact != OTHER)
 
     @property
     def steps(self) -> int:
@@ -157,8 +157,9 @@ def motion_log(
         here: the plane with its table, or space; by default the plane of x and z.
         axes: (A, 3) see `MotionLog`; by default all that the object can turn about. Of an edge that is held at both
             ends it is the edge alone.
-        angular_velocity: (N+1,) or (N+1, 3), contact_force: (N, d), position: (N+1, d), contact: (N,) as in
-            `MotionLog`, in the plane of x and z with planar values; by default not measured, and sticking all the time.
+        angular_velocity: (N+1,) or (N+1, 3), contact_force: (N, d) or (N, 3), position: (N+1, d) or (N+1, 3),
+            contact: (N,) as in `MotionLog`, in the plane of x and z also with planar values; by default not measured,
+            and sticking all the time.
 
     Raises:
         ValueError: an array that does not fit the others; it is named.
@@ -181,7 +182,7 @@ def motion_log(
         rates = where.axial(rates) if planar else rates
     does = np.zeros(steps, np.int8) if contact is None else array("contact", contact, (steps,)).astype(np.int8)
     if not np.isin(does, range(len(CONTACT))).all():
-        raise fail("contact", does, "0 (sticks), 1 (slides) or 2 (open) in each step")
+        raise fail("contact", does, "0 (sticks), 1 (slides), 2 (open) or 3 (other) in each step")
     return MotionLog(
         space=where,
         time=at,
@@ -195,21 +196,27 @@ def motion_log(
         axes=around if axes is None else array("axes", axes, (None, 3)),
         angular_velocity=rates,
         contact_force=_contact_forces(where, contact_force, does),
-        position=None if position is None else where.lift(array("position", position, (states, dim))),
+        position=None if position is None else _lifted(where, "position", position, states),
         contact=frozen(does),
     )
 
 
+def _lifted(here: Space, name: str, value: ArrayLike, rows: int) -> Array:
+    """(rows, 3) world axes, of vectors that may be planar."""
+    if np.ndim(value) == 2 and np.shape(value)[1] == 3:
+        return array(name, value, (rows, 3))
+    return frozen(here.lift(array(name, value, (rows, here.dim))))
+
+
 def _contact_forces(here: Space, given: ArrayLike | None, does: NDArray[np.int8]) -> Array:
     """(N, 3) as of `MotionLog`; an open contact exerts none, measured or not."""
-    forces = np.full((len(does), here.dim), np.nan)
+    forces = np.full((len(does), 3), np.nan)
     if given is not None:
-        values = np.asarray(given, dtype=float)
-        known = np.isfinite(values).all(axis=-1)
-        forces[known] = array("contact_force", np.where(known[..., None], values, 0.0), forces.shape)[known]
+        known = np.isfinite(np.asarray(given, dtype=float)).all(axis=-1)
+        filled = np.where(known[:, None], given, 0.0)
+        forces[known] = _lifted(here, "contact_force", filled, len(does))[known]
     forces[does == OPEN] = 0.0
-    known = np.isfinite(forces).all(axis=1)
-    return frozen(np.where(known[:, None], here.lift(np.where(known[:, None], forces, 0.0)), np.nan))
+    return frozen(forces)
 
 
 def world_force(log: MotionLog) -> Array:

@@ -65,7 +65,7 @@ def parameters(
 def _named(unknowns: Unknowns) -> list[tuple[str, str]]:
     """Names and units, in the order of a table."""
     moments = unknowns.moments
-    coms = [(name.removeprefix("m "), "m") for name in moments]
+    coms = [(com_of(name), "m") for name in moments]
     inertias = [(name, "kg m^2") for name in unknowns.names if name.startswith("I_P")]
     return [("mass", "kg"), *coms, ("inertia", ""), *((name, "kg m") for name in moments), *inertias]
 
@@ -75,7 +75,7 @@ def _intervals(unknowns: Unknowns, found: Polytope) -> dict[str, Interval]:
     ends = {name: Interval(low, high) for name, low, high in zip(unknowns.names, *_ends(found), strict=True)}
     for name, lever in zip(unknowns.moments, unknowns.lever[unknowns.axes].tolist(), strict=True):
         low, high = found.ratio(unknowns.names.index(name), 0)
-        ends[name.removeprefix("m ")] = Interval(low - lever, high - lever)
+        ends[com_of(name)] = Interval(low - lever, high - lever)
     return {**ends, "mass": ends["m"], "inertia": ends["s"]}
 
 
@@ -87,7 +87,7 @@ def _estimates(unknowns: Unknowns, mean: Array) -> dict[str, float]:
     """Likewise, of a point."""
     at = dict(zip(unknowns.names, mean.tolist(), strict=True))
     for name, lever in zip(unknowns.moments, unknowns.lever[unknowns.axes].tolist(), strict=True):
-        at[name.removeprefix("m ")] = at[name] / at["m"] - lever
+        at[com_of(name)] = at[name] / at["m"] - lever
     return {**at, "mass": at["m"], "inertia": at["s"]}
 
 
@@ -107,13 +107,18 @@ def _why(
         return ("the errors hide it" if weighed else f"{PRODUCT}: it takes a contact force or a lift-off"), False
     if name == "inertia":
         return f"{PRODUCT}: m |c|^2 is not known well enough to be taken from I_P", False
-    place = unknowns.names.index(name if name in unknowns.names else f"m {name}")
+    place = unknowns.names.index(name if name in unknowns.names else name.replace("com_", "m c_"))
     visible = max(seen.motion[place], seen.force[place])
     if visible > UNSEEN:
-        return ("the errors hide it" if name in unknowns.names else "the mass is not known well enough"), False
+        return ("the errors hide it" if name in unknowns.names else "mass and m c are not known well enough"), False
     if name.startswith("I_P"):
         return "the object did not turn so that it counts", False
     return "no balance depends on it: about an edge only the parts across it count", False
+
+
+def com_of(moment: str) -> str:
+    """The name of the centre of mass along the axis of a first moment."""
+    return moment.replace("m c_", "com_")
 
 
 def narrower(before: Interval, after: Interval) -> bool:

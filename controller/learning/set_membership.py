@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-import numpy as np
 from pivoting.controller.learning.balances import Cuts
 from pivoting.controller.learning.polytope import Polytope
 from pivoting.controller.learning.unknowns import Unknowns
@@ -41,10 +40,3 @@ class SetMembership:
         status = UNCHANGED if smaller is self.set else SHRUNK
         self.set = smaller
         return Update(status, self.set)
-
-    @property
-    def farthest(self) -> float:
-        """A bound on the first moment |h| of all members [kg m]."""
-        dim = self.unknowns.space.dim
-        ends = np.maximum(np.abs(self.set.low), np.abs(self.set.high))
-        return float(np.linalg.norm(ends[1 : 1 + dim]))

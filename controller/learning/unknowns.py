@@ -8,6 +8,8 @@ by linear inequalities: a product m c_i c_j lies between its McCormick envelopes
 """
 
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +21,7 @@ from pivoting.controller.validate import Array, fail
 ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # of an inertia tensor, in their order in x
 MASS, MOMENT, INERTIA, FACTOR = 0, slice(1, 4), slice(4, 10), 10  # places in all eleven numbers
 COUNT = 11
+NARROW = 0.5  # cosine of the widest cone about the believed direction that is used
 TANGENTS = 3  # to m c_i^2 over the interval of c_i, from below
 
 
@@ -67,6 +70,22 @@ class Unknowns:
     def axes(self) -> list[int]:
         """The object axes that the plane or space has."""
         return [0, 2] if self.space.dim == 2 else [0, 1, 2]
+
+    @cached_property
+    def farthest(self) -> Array:
+        """(11,) a row whose product with any member x is at least |h|, the size of the first moment.
+
+        Within a cone about a direction d, of half-angle a, it is at most h d / cos a; and anywhere m max |c|.
+        """
+        corners = np.array(list(product(*self.com)))
+        distances = np.linalg.norm(corners, axis=1)
+        row, length = np.zeros(COUNT), float(np.linalg.norm(self.lever))
+        cosine = (corners @ self.lever / np.maximum(length * distances, 1e-300)).min() if length > 0.0 else 0.0
+        if cosine > NARROW:
+            row[MOMENT] = self.lever / (length * cosine)
+        else:
+            row[MASS] = distances.max()
+        return row
 
     def select(self, rows: Array) -> Array:
         """(..., n) the columns of the unknowns of rows (..., 11)."""
