@@ -69,8 +69,9 @@ class Begun(NamedTuple):
     def part(self, first: int, worlds: int) -> "Begun":
         """The same for some of the worlds, from that with the index `first` on."""
         setting = self.setting
-        some = setting._replace(worlds=worlds, first_world=setting.first_world + first)
-        return self._replace(setting=some, belief=self.belief.part(first, worlds))
+        belief = self.belief.part(first, worlds)
+        counts = {"worlds": worlds, "first_world": setting.first_world + first}
+        return self._replace(setting=setting._replace(**counts, controllers=belief.controllers), belief=belief)
 
 
 def set_up(
@@ -93,7 +94,7 @@ def set_up(
     world = build_world(case, belief.scene, scene, belief.placement)
     turning = -matrix(belief.placement.body.table)[:, 1:2].T if belief.placement.body.dim == 2 else np.eye(3)
     counts = int(seed), int(worlds), int(first_world)
-    setting = Setting(*counts, world.dt, turning, belief.attached.controller.law)
+    setting = Setting(*counts, world.dt, turning, belief.attached.controller.law, belief.controllers)
     timed = _timed(case, belief, world)
     return Begun(asked, case, belief, world, *timed, setting)
 

@@ -44,8 +44,9 @@ class Cuts:
 
     @classmethod
     def together(cls, cuts: "Sequence[Cuts]") -> Self:
-        """All of several cuts."""
-        return cls(*(np.concatenate([getattr(each, name) for each in cuts]) for name in vars(cuts[0])))
+        """All of several cuts, or of none."""
+        none = cls(np.zeros((0, COUNT)), np.zeros(0), np.zeros((0, COUNT)), np.zeros(0))
+        return cls(*(np.concatenate([getattr(each, name) for each in (none, *cuts)]) for name in vars(none)))
 
 
 class Balances:

@@ -1,8 +1,6 @@
 """Identification: what a whole log tells of each parameter, by which measurement, and what it cannot tell, and why."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import groupby
 
 import numpy as np
 from pivoting.controller.learning.balances import Balances, Cuts
@@ -13,7 +11,7 @@ from pivoting.controller.learning.parameters import Parameter, Seen, com_of, nar
 from pivoting.controller.learning.polytope import Polytope
 from pivoting.controller.learning.set_membership import SetMembership
 from pivoting.controller.learning.unknowns import Unknowns
-from pivoting.controller.learning.windows import Window, windows
+from pivoting.controller.learning.windows import windows
 from pivoting.controller.rotations import rotation_matrix
 from pivoting.controller.uncertainty.uncertainty import Interval, Uncertainty
 from pivoting.controller.validate import Array, fail, frozen
@@ -63,13 +61,11 @@ def identify(log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns, *, s
     estimator, squares = SetMembership(unknowns), RecursiveLeastSquares(unknowns)
     stages, seen, count = [estimator.set], [], 0
     for make in (moment_cuts, force_cuts):
-        most = np.zeros(len(estimator.prior.low))
-        for cuts in make(log, errors, unknowns):
-            count += len(cuts.values)
-            most = np.maximum(most, _visible(unknowns, cuts, estimator.prior))
-            squares.update(cuts)
-            estimator.update(cuts)
-        seen.append(most)
+        cuts = make(log, errors, unknowns)
+        count += len(cuts.values)
+        seen.append(_visible(unknowns, cuts, estimator.prior))
+        squares.update(cuts)
+        estimator.update(cuts)
         stages.append(estimator.set)
     if count == 0:
         raise fail("log", f"{log.steps} steps", "at least 16 steps on end in which the contact sticks")
@@ -80,26 +76,27 @@ def identify(log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns, *, s
     return Identification((*found, friction), uncertainty, shift, unknowns, estimator.set, resets, count)
 
 
-def moment_cuts(log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns) -> list[Cuts]:
-    """The cuts of all windows in which the contact sticks, those of one length together; the longest first."""
+def moment_cuts(log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns) -> Cuts:
+    """The cuts of all windows in which the contact sticks."""
     balances, found = Balances(log, errors, unknowns), windows(log.sticking)
-    cuts = _grouped(found, balances.moments)
-    return cuts if log.angular_velocity is None else cuts + _grouped(found, balances.rates)
+    cuts = [balances.moments(window) for window in found]
+    if log.angular_velocity is not None:
+        spans = {(window.first, window.last): window for window in found}  # of which the shape does not matter here
+        cuts += [balances.rates(window) for window in spans.values()]
+    return Cuts.together(cuts)
 
 
-def force_cuts(log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns) -> list[Cuts]:
-    """Likewise, of all windows in which all forces are known."""
-    return _grouped(windows(log.weighed), Balances(log, errors, unknowns).forces)
-
-
-def _grouped(found: list[Window], make: Callable[[Window], Cuts]) -> list[Cuts]:
-    lengths = groupby(found, key=lambda window: window.last - window.first)
-    return [Cuts.together([make(window) for window in group]) for _, group in lengths]
+def force_cuts(log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns) -> Cuts:
+    """The cuts of all windows in which all forces are known."""
+    balances = Balances(log, errors, unknowns)
+    return Cuts.together([balances.forces(window) for window in windows(log.weighed)])
 
 
 def _visible(unknowns: Unknowns, cuts: Cuts, prior: Polytope) -> Array:
     """(n,) by how much each unknown could change a balance, over its error, at most; see `Seen`."""
     middle = 0.5 * (prior.low + prior.high)
+    if not len(cuts.values):
+        return np.zeros(len(middle))
     error = unknowns.select(cuts.spreads) @ middle + cuts.errors
     changes = np.abs(unknowns.select(cuts.rows)) * (prior.high - prior.low)
     return (changes / np.maximum(error, 1e-12 * changes.max() + 1e-300)[:, None]).max(axis=0)

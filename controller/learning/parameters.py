@@ -10,6 +10,7 @@ from pivoting.controller.validate import Array
 
 NARROWER = 0.99  # of its width before: what is wider counts as not told
 UNSEEN = 1e-6  # of a balance's error: what could change it by no more does not occur in it
+_UNKNOWN = {"mass": "m", "inertia": "s"}  # the names of parameters among the unknowns, where they are others
 PRODUCT = "a pivot on a contact that sticks tells only m c and I_P"
 
 
@@ -96,10 +97,11 @@ def _why(
 ) -> tuple[str, bool]:
     """What told it, or why nothing could, and which of the two."""
     by = ["motion"] * narrower(before, moved) + ["contact force"] * narrower(moved, after)
-    direct = name in unknowns.names or (name == "mass" and "contact force" in by)
+    place = unknowns.names.index(_UNKNOWN.get(name, name.replace("com_", "m c_")))
+    visible = max(seen.motion[place], seen.force[place]) > UNSEEN
+    direct = visible and name in ("mass", *unknowns.names) and (name != "mass" or by == ["contact force"])
     if by:
-        others = {"mass": "the centre of mass", "inertia": "mass and centre of mass"}
-        return " and ".join(by) + ("" if direct else f", with what is known of {others.get(name, 'the mass')}"), True
+        return " and ".join(by) + ("" if direct else f", with what is known of {_others(name)}"), True
     if before.half == 0.0:
         return "it was known", False
     weighed = bool((seen.force > 0.0).any())
@@ -107,13 +109,18 @@ def _why(
         return ("the errors hide it" if weighed else f"{PRODUCT}: it takes a contact force or a lift-off"), False
     if name == "inertia":
         return f"{PRODUCT}: m |c|^2 is not known well enough to be taken from I_P", False
-    place = unknowns.names.index(name if name in unknowns.names else name.replace("com_", "m c_"))
-    visible = max(seen.motion[place], seen.force[place])
-    if visible > UNSEEN:
+    if visible:
         return ("the errors hide it" if name in unknowns.names else "mass and m c are not known well enough"), False
     if name.startswith("I_P"):
         return "the object did not turn so that it counts", False
     return "no balance depends on it: about an edge only the parts across it count", False
+
+
+def _others(name: str) -> str:
+    """What a parameter that no balance has alone is found with."""
+    if name.startswith("com_"):
+        return "the mass"
+    return "the centre of mass" if name == "mass" else "mass and centre of mass"
 
 
 def com_of(moment: str) -> str:

@@ -6,8 +6,8 @@ import numpy as np
 from pivoting.controller.validate import Array, frozen
 from scipy.optimize import linprog
 
-MOST = 96  # inequalities that are kept without looking for redundant ones
-ROUNDING = 1e-9  # of the size of a row: a bound is loosened by so much, which is more than rounding can take away
+MOST = 128  # inequalities that are kept without looking for redundant ones
+ROUNDING = 1e-10  # of the size of a row: a bound is loosened by so much, which is more than rounding can take away
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +29,9 @@ class Polytope:
 
     @classmethod
     def box(cls, low: Array, high: Array) -> "Polytope":
-        """A box."""
-        return cls(np.zeros((0, len(low))), np.zeros(0), frozen(np.array(low)), frozen(np.array(high)))
+        """A box, loosened by more than rounding can take away."""
+        loose = ROUNDING * np.maximum(np.abs(low), np.abs(high))
+        return cls(np.zeros((0, len(low))), np.zeros(0), frozen(low - loose), frozen(high + loose))
 
     def cut(self, A: Array, b: Array) -> "Polytope | None":
         """What of it satisfies A x <= b, with (M, n) and (M,), too; None: nothing does, which is certified."""

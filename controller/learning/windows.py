@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pivoting.controller.validate import Array
 
 SLOPES = (4, 16)  # how many of its slopes a window is long
-HALVINGS = 4  # of the longest window, to the shortest one
-OVERLAP = 4  # windows of one length that cover the same time
+HALVINGS = 3  # of the longest window, to the shortest one
+OVERLAP = 2  # windows of one length that cover the same time
 LEAST_STEPS = 8  # of a slope
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pivoting.controller.control_laws import Law
 from pivoting.controller.kernels.compiled_step import STATE
 from pivoting.controller.validate import frozen
+from pivoting.controller.wrench_controller import WrenchController
 
 Array = NDArray[np.float64]
 # The columns of a state's values.
@@ -207,6 +208,7 @@ class Setting(NamedTuple):
         dt: time step [s].
         axes: (A, 3) world axes about which the object can turn: the plane's normal, or three.
         law: of the controller.
+        controllers: one for each world, or one that they share; what they believe.
     """
 
     seed: int
@@ -215,6 +217,7 @@ class Setting(NamedTuple):
     dt: float
     axes: Array
     law: Law
+    controllers: tuple[WrenchController, ...]
 
 
 class Stages(NamedTuple):
@@ -238,4 +241,6 @@ def build_stages(values: Mapping[str, float], setting: Setting) -> Stages:
             module, _, name = place.partition(":")
             made = getattr(import_module(module), name)(value, setting)
             built[made.slot].append(made)
+            if made.slot == "observe" and hasattr(made, "correct"):  # what it observes, it takes away again
+                built["correct"].append(made.correct)
     return Stages(**{slot: tuple(stages) for slot, stages in built.items()})
