@@ -70,8 +70,8 @@ class Begun(NamedTuple):
         """The same for some of the worlds, from that with the index `first` on."""
         setting = self.setting
         belief = self.belief.part(first, worlds)
-        counts = {"worlds": worlds, "first_world": setting.first_world + first}
-        return self._replace(setting=setting._replace(**counts, controllers=belief.controllers), belief=belief)
+        some = setting._replace(worlds=worlds, first_world=setting.first_world + first, controllers=belief.controllers)
+        return self._replace(setting=some, belief=belief)
 
 
 def set_up(

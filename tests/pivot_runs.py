@@ -102,7 +102,20 @@ def _drawn(rng: np.random.Generator, count: int, dim: int, shove: float, omega: 
         axis = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
         squeeze = 9.81 * mass * rng.uniform(-0.5, 0.5, 3) * used
         rows.append(
-            (unknowns, member, member.mass, com, J, believed, unknowns.lever, dt, axis, pushed, rng.random() < 0.5, squeeze)
+            (
+                unknowns,
+                member,
+                member.mass,
+                com,
+                J,
+                believed,
+                unknowns.lever,
+                dt,
+                axis,
+                pushed,
+                rng.random() < 0.5,
+                squeeze,
+            )
         )
     columns = list(zip(*rows, strict=True))
     known = tuple(np.array(each) for each in zip(*columns[5], strict=True))
@@ -145,7 +158,9 @@ def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     return np.einsum("wij,wj->wi", matrices, vectors)
 
 
-def _rk4(drawn: Drawn, solve: np.ndarray, q: np.ndarray, omega: np.ndarray, wrench: np.ndarray, push: np.ndarray) -> Any:
+def _rk4(
+    drawn: Drawn, solve: np.ndarray, q: np.ndarray, omega: np.ndarray, wrench: np.ndarray, push: np.ndarray
+) -> Any:
     """One step with a wrench that is fixed to the objects or to the world."""
     F, M = rotated(q, wrench[:, :3]), rotated(q, wrench[:, 3:])
     first_moment = drawn.mass[:, None] * drawn.com

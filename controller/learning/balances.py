@@ -1,13 +1,13 @@
 """Cuts: what the balances of moments and of forces, integrated over windows, say of the unknowns under bounded errors.
 
 About a contact that stays where it is the angular momentum L changes by the moments of the known wrench and of gravity.
-With S the second moment of the mass, S = tr(J) / 2 - J, and w the weight of a window,
+With the second moment of the mass S = tr(J) / 2 - J, and w the weight of a window,
 
     -int w' L dt - int w (R h) x g dt = int w M dt + (what is unknown),    L dt = int (R xi) x (dR xi) dm,
 
-in which L needs no rates: along straight lines between measured rotations the integral is a sum of (R_k xi) x (R_k+1 xi).
-Both sides are linear in J and h. The forces, likewise, are linear in m and h: m times the acceleration of R c is (R h)''.
-docs/notes/learning.md derives the errors that are bounded here.
+in which L needs no rates: along straight lines between measured rotations it is a sum of (R_k xi) x (R_k+1 xi). Both
+sides are linear in J and h. The forces are linear in m and h: m times the acceleration of R c is the second derivative
+of R h. docs/notes/learning.md derives the errors that are bounded here.
 """
 
 from collections.abc import Sequence

@@ -102,9 +102,7 @@ def _visible(unknowns: Unknowns, cuts: Cuts, prior: Polytope) -> Array:
     return (changes / np.maximum(error, 1e-12 * changes.max() + 1e-300)[:, None]).max(axis=0)
 
 
-def _friction(
-    log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns, several: bool
-) -> tuple[Parameter, int]:
+def _friction(log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns, several: bool) -> tuple[Parameter, int]:
     """The friction coefficient, and 1 where its bounds contradict the prior, else 0."""
     before = unknowns.prior.mu or ANY
     normal = rotation_matrix(log.space.base)[:, 2]
@@ -113,8 +111,8 @@ def _friction(
     if after is None:
         told = f"at least {bounds.used:.3g} was used without a slip, and at most {bounds.slipped:.3g} in one"
         return Parameter("mu", "", before, before, None, f"contradicts the prior: {told}", False), 1
-    told = narrower(before, after)
-    return Parameter("mu", "", before, after, None, _why_friction(log, bounds, before, several), told), 0
+    why = _why_friction(log, bounds, before, several)
+    return Parameter("mu", "", before, after, None, why, narrower(before, after)), 0
 
 
 def _why_friction(log: MotionLog, bounds: FrictionBounds, before: Interval, several: bool) -> str:

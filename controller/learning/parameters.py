@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 from pivoting.controller.learning.polytope import Polytope
-from pivoting.controller.learning.unknowns import ENTRIES, Unknowns
+from pivoting.controller.learning.unknowns import Unknowns
 from pivoting.controller.uncertainty.uncertainty import Interval
 from pivoting.controller.validate import Array
 

@@ -130,4 +130,3 @@ class Polytope:
     def _bounds(self, scale: Array) -> list[tuple[float, float]]:
         half = 0.5 * (self.high - self.low) / scale
         return list(zip(-half, half, strict=True))
-

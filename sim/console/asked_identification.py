@@ -50,7 +50,9 @@ def asked_log(file: Path, world: int, given: Mapping[str, Any]) -> AskedLog:
     else:
         missing = [f"--{name}" for name in BELIEVED if given[name] is None]
         if missing:
-            raise click.UsageError(f"Missing option{'s' * (len(missing) > 1)} {', '.join(missing)}, of a table of your own.")
+            raise click.UsageError(
+                f"Missing option{'s' * (len(missing) > 1)} {', '.join(missing)}, of a table of your own."
+            )
         table, edge = LogTable(file), given["edge"]
         tilted = float(np.deg2rad(given["incline"]))
         log = table_log(table, given["lever"], given["gravity"], table_tilt=tilted, edge=edge, rates=rates)

@@ -61,15 +61,19 @@ def print_identification(
     head = f"{file}: {log.steps} steps in {seconds:.4g} s in the {kind}, {int(log.sticking.sum())} of them sticking"
     console.print(head, highlight=False, markup=False, soft_wrap=True)
     bounds = ", ".join(_bounded(name, value) for name, value in asdict(errors).items() if value > 0.0)
-    console.print(f"taken as bounds on errors: {bounds or 'none'}", highlight=False, markup=False, soft_wrap=True, style="dim")
-    console.print(_line("", "before", "after", "fit", "what told it, or why nothing could"), style="bold", soft_wrap=True)
+    console.print(
+        f"taken as bounds on errors: {bounds or 'none'}", highlight=False, markup=False, soft_wrap=True, style="dim"
+    )
+    console.print(
+        _line("", "before", "after", "fit", "what told it, or why nothing could"), style="bold", soft_wrap=True
+    )
     for each in found.parameters:
         name = each.name + (f", {each.unit}" if each.unit else "")
         estimate = "" if each.estimate is None else f"{each.estimate:.4g}"
         line = _line(name, _shown(each.before), _shown(each.after), estimate, each.why)
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     shift = ", ".join(f"{1e3 * value:.3g}" for value in found.shift)
-    told = f"com: from where it is believed to be; m c and I_P: about the contact; inertia: a factor; fit: least squares"
+    told = "com: from where it is believed to be; m c and I_P: about the contact; inertia: a factor; fit: least squares"
     console.print(told, highlight=False, markup=False, soft_wrap=True, style="dim")
     moved = f"for the controller: move the believed centre of mass by ({shift}) mm"
     console.print(moved, highlight=False, markup=False, soft_wrap=True)

@@ -63,19 +63,41 @@ class _Box(click.ParamType):
 
 
 def _bound(name: str, help: str, default: float | None = 0.0) -> Any:
-    return click.option(name, type=click.FloatRange(min=0.0), default=default, show_default=default is not None, help=help)
+    return click.option(
+        name, type=click.FloatRange(min=0.0), default=default, show_default=default is not None, help=help
+    )
 
 
 @click.command(cls=_Identify)
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--lever", type=_Numbers(), help="From the contact to the believed centre of mass, object axes, m.")
-@click.option("--inertia", type=_Numbers(), help="Believed, about the centre of mass, kg m^2: I, or Ixx,Iyy,Izz[,Ixy,Ixz,Iyz].")
+@click.option(
+    "--inertia", type=_Numbers(), help="Believed, about the centre of mass, kg m^2: I, or Ixx,Iyy,Izz[,Ixy,Ixz,Iyz]."
+)
 @click.option("--mass", type=_Interval(), help="In which it is, kg.  [of a saved run: 20 % either way]")
-@click.option("--com", type=_Box(), help="In which the centre of mass is, from where it is believed to be, m.  [of a saved run: 10 % of the lever]")
-@click.option("--factor", type=_Interval(), default="0.8:1.2", show_default=True, help="In which the factor on the believed inertia is.")
+@click.option(
+    "--com",
+    type=_Box(),
+    help="In which the centre of mass is, from where it is believed to be, m.  [of a saved run: 10 % of the lever]",
+)
+@click.option(
+    "--factor",
+    type=_Interval(),
+    default="0.8:1.2",
+    show_default=True,
+    help="In which the factor on the believed inertia is.",
+)
 @click.option("--mu", type=_Interval(), help="In which the friction coefficient is.  [default: anything]")
-@click.option("--gravity", type=click.FloatRange(min=0.0), default=9.81, show_default=True, help="m/s^2; of a saved run its own.")
-@click.option("--incline", type=float, default=0.0, show_default=True, help="By which the table rises to the right, in the plane, deg.")
+@click.option(
+    "--gravity", type=click.FloatRange(min=0.0), default=9.81, show_default=True, help="m/s^2; of a saved run its own."
+)
+@click.option(
+    "--incline",
+    type=float,
+    default=0.0,
+    show_default=True,
+    help="By which the table rises to the right, in the plane, deg.",
+)
 @click.option("--edge", type=_Numbers(), help="Direction, world axes, of an edge that is held at both ends.")
 @_bound("--theta-error", "Of a measured orientation, about each axis, deg.", 0.1)
 @_bound("--omega-error", "Of a measured angular velocity, rad/s; without it they are not used.", None)

@@ -33,15 +33,15 @@ PLANAR = {
     "position": Column(("x_m", "z_m"), "measured position of the believed centre of mass, world axes"),
 }
 SPATIAL = {
-    "orientation": Column(("qw", "qx", "qy", "qz"), "measured orientation, object axes to world, as a quaternion", True),
+    "orientation": Column(
+        ("qw", "qx", "qy", "qz"), "measured orientation, object axes to world, as a quaternion", True
+    ),
     "wrench": Column(
         tuple(f"wrench_F{axis}_N" for axis in "xyz") + tuple(f"wrench_M{axis}_N_m" for axis in "xyz"),
         "known wrench from this row to the next, at the believed centre of mass, object axes",
         True,
     ),
-    "angular_velocity": Column(
-        tuple(f"w{axis}_rad_s" for axis in "xyz"), "measured angular velocity, world axes"
-    ),
+    "angular_velocity": Column(tuple(f"w{axis}_rad_s" for axis in "xyz"), "measured angular velocity, world axes"),
     "contact_force": Column(
         ("force_t_N", "force_o_N", "force_n_N"), "measured sum of the contact forces, along the world's x, y and z"
     ),
@@ -54,7 +54,10 @@ def column_help() -> list[tuple[str, list[tuple[str, str]]]]:
     planar = [TIME, ANGLE._replace(needed=True), *PLANAR.values(), CONTACT]
     spatial = [TIME, *SPATIAL.values(), CONTACT]
     return [
-        (f"Columns of FILE, {kind} (of its last row, which ends the log, only what is measured counts)", _lines(columns))
+        (
+            f"Columns of FILE, {kind} (of its last row, which ends the log, only what is measured counts)",
+            _lines(columns),
+        )
         for kind, columns in (("in the plane", planar), ("in space", spatial))
     ]
 

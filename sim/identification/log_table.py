@@ -1,7 +1,9 @@
 """A user's own table, read from a CSV or Parquet file: its columns as numbers, and one clear error where it has none."""
 
 import csv
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +27,8 @@ class LogTable:
 
     def __init__(self, path: Path):
         self.path = path
-        self._columns = _read_csv(path) if path.suffix.lower() == ".csv" else _read_parquet(path)
-        self.rows = len(next(iter(self._columns.values()), ()))
+        self._columns: Mapping[str, Any] = _read_csv(path) if path.suffix.lower() == ".csv" else _read_parquet(path)
+        self.rows = max((len(values) for values in self._columns.values()), default=0)
         if self.rows < 3:
             raise InputError(f"{path}: has {self.rows} rows; must have at least 3")
 
@@ -113,7 +115,9 @@ def _read_csv(path: Path) -> dict[str, list[str]]:
         raise InputError(f"{path}: has two columns {twice!r}")
     for number, row in enumerate(rows[1:], 1):
         if len(row) != len(names):
-            raise InputError(f"{path}: row {number} has {len(row)} values; must have one for each of {len(names)} columns")
+            raise InputError(
+                f"{path}: row {number} has {len(row)} values; must have one for each of {len(names)} columns"
+            )
     return {name: [row[i].strip() for row in rows[1:]] for i, name in enumerate(names)}
 
 

@@ -167,7 +167,9 @@ def _normalised(table: LogTable, quaternions: Array) -> Array:
     bad = np.flatnonzero(np.abs(length - 1.0) > ROUNDED)
     if bad.size:
         allowed = f"within {ROUNDED:g} of 1"
-        raise InputError(f"{table.path}: row {bad[0] + 1} of qw, qx, qy, qz has length {length[bad[0]]:.6g}; must be {allowed}")
+        raise InputError(
+            f"{table.path}: row {bad[0] + 1} of qw, qx, qy, qz has length {length[bad[0]]:.6g}; must be {allowed}"
+        )
     return quaternions / length[:, None]
 
 

@@ -31,7 +31,9 @@ class DisturbanceObserver:
     def __init__(self, rate: float, setting: Setting):
         if not setting.law.feedforward:
             raise fail(
-                "disturbance", rate, f"0 with law={setting.law.formulation}, which follows no acceleration; or law=dynamic"
+                "disturbance",
+                rate,
+                f"0 with law={setting.law.formulation}, which follows no acceleration; or law=dynamic",
             )
         if rate * setting.dt >= 1.0:
             raise fail("disturbance", rate, f"< 1 / dt = {1.0 / setting.dt:g} 1/s")
