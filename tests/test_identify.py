@@ -130,7 +130,10 @@ LATE, GAP = np.arange(401.0)[::-1], np.where(np.arange(401) == 7, np.nan, 1.0)
     ("change", "message"),
     [
         (changed(theta_deg=None), "has no column theta_rad or theta_deg (measured angle from the table"),
-        (changed(wrench_Fv_N=None), "has no column wrench_Fv_N, which belongs to wrench_Fu_N, wrench_Fv_N, wrench_M_N_m"),
+        (
+            changed(wrench_Fv_N=None),
+            "has no column wrench_Fv_N, which belongs to wrench_Fu_N, wrench_Fv_N, wrench_M_N_m",
+        ),
         (changed(wrench_Fu_N=None, wrench_Fv_N=None, wrench_M_N_m=None), "or wrench_Fx_N, wrench_Fy_N, wrench_Fz_N"),
         (changed(theta_deg=GAP), "row 8 of theta_deg is nan; must be a finite number"),
         (changed(wrench_M_N_m=GAP), "row 8 of wrench_M_N_m is nan; must be a finite number"),

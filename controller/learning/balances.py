@@ -61,6 +61,8 @@ class Balances:
         self._turn = errors.theta * np.sqrt(1.0 if log.space.dim == 2 else 3.0)  # angle of an error of orientation
         self._R = np.array([rotation_matrix(q) for q in log.orientation])
         self._moment, self._force = world_moment(log), world_force(log)
+        self._arm = np.linalg.norm(log.force, axis=1) * float(np.linalg.norm(log.lever))  # (N,) of moments [N m]
+        self._load = np.linalg.norm(log.moment, axis=1) + self._arm
         self._tensors = np.array([_momentum_rows(self._R, axis) for axis in log.axes])  # (A, N, 6)
         self._arms = np.array([np.cross(log.gravity, axis) @ self._R for axis in log.axes])  # (A, N+1, 3)
 
@@ -77,8 +79,8 @@ class Balances:
         turned = self._turn * w.size.sum() + self._between(w)
         heavy = np.linalg.norm(np.cross(log.gravity, log.axes), axis=1) * turned + errors.shove
         spreads += heavy[:, None] * self._farthest
-        error = np.abs(along) @ (0.5 * w.duration**2 * np.abs(w.slope) + errors.wrench * w.size)
-        return Cuts(rows, along @ w.step, spreads, error + self._turned_moments(w, steps, along))
+        late = np.abs(along) @ (0.5 * w.duration**2 * np.abs(w.slope))
+        return Cuts(rows, along @ w.step, spreads, late + self._moment_error(w, steps, along))
 
     def forces(self, window: Window) -> Cuts:
         """Of the balance of forces along each world axis that the plane or space has; contact forces are measured."""
@@ -100,8 +102,8 @@ class Balances:
         known = self._force[steps]
         size = np.linalg.norm(known, axis=1)
         late = (size + np.linalg.norm(log.contact_force[steps], axis=1)) @ (0.5 * w.duration**2 * np.abs(w.slope))
-        turned = size @ (w.size * (self._turn + errors.rate * w.duration))
-        error = late + errors.wrench * size @ w.size + turned + errors.contact_force * w.size.sum()
+        turned = size @ (w.most * (self._turn + errors.rate * w.duration))
+        error = late + errors.wrench * size @ w.most + turned + errors.contact_force * w.size.sum()
         values = (known + log.contact_force[steps]).T @ w.step
         return Cuts(rows, axes @ values, spreads, np.full(len(axes), error))
 
@@ -113,7 +115,7 @@ class Balances:
         time = log.time[window.first : window.last + 1]
         duration = np.diff(time)
         around = np.concatenate([[0.5 * duration[0]], 0.5 * (duration[1:] + duration[:-1]), [0.5 * duration[-1]]])
-        w = Weights(around, duration, duration, np.zeros(len(duration)), duration)
+        w = Weights(around, duration, duration, duration, np.zeros(len(duration)), duration)
         axes = len(log.axes)
         rows, spreads = np.zeros((axes, COUNT)), np.zeros((axes, COUNT))
         for sign, k in zip((-1.0, 1.0), ends, strict=True):
@@ -123,14 +125,12 @@ class Balances:
         rows[:, MOMENT] = -np.einsum("k,akj->aj", around, self._arms[:, window.first : window.last + 1])
         along = log.axes @ self._moment[steps].T
         planar = log.space.dim == 2
-        spreads[:, self._size] = 2.0 * (self._rate_error + (0.0 if planar else 2.0 * self._turn * errors.rate))
+        wrong = 2.0 * self._rate_error if planar else self._rate_error + 2.0 * self._turn * errors.rate
+        spreads[:, self._size] = wrong
         turned = self._turn * w.size.sum() + self._between(w)
         heavy = np.linalg.norm(np.cross(log.gravity, log.axes), axis=1) * turned + errors.shove
         spreads += heavy[:, None] * self._farthest
-        late = 0.5 * (np.abs(along[:, 0]) * duration[0] + np.abs(along[:, -1]) * duration[-1])
-        late += 0.5 * np.abs(np.diff(along, axis=1)) @ np.minimum(duration[1:], duration[:-1])
-        error = late + errors.wrench * np.abs(along) @ duration
-        return Cuts(rows, along @ duration, spreads, error + self._turned_moments(w, steps, along))
+        return Cuts(rows, along @ duration, spreads, self._moment_error(w, steps, along))
 
     @property
     def _size(self) -> slice | list[int]:
@@ -154,15 +154,16 @@ class Balances:
         """The integral of w times the greatest angle from the nearest measurement [rad s]."""
         return float(0.25 * self._errors.rate * w.duration @ w.size)
 
-    def _turned_moments(self, w: Weights, steps: slice, along: Array) -> Array:
-        """(A,) error of the known moments, whose axes are not measured exactly and turn within a step."""
+    def _moment_error(self, w: Weights, steps: slice, along: Array) -> Array:
+        """(A,) error of the known moments: their own, that of the axes that they are measured in, and what they turn
+        by within a step."""
         moment, errors = self._moment[steps], self._errors
-        arms = np.linalg.norm(self._force[steps], axis=1) * float(np.linalg.norm(self._log.lever))
-        error = np.full(len(along), (0.5 * errors.rate * w.duration * arms) @ w.size)
+        own = errors.wrench * self._load[steps] + errors.rate * w.duration * self._arm[steps]
+        error = np.full(len(along), own @ w.most)
         if self._log.space.dim == 3:
             angle = self._turn + errors.rate * w.duration
             across = np.sqrt(np.maximum(np.sum(moment**2, axis=1) - along**2, 0.0))
-            error += (across * angle + 0.5 * np.abs(along) * angle**2) @ w.size
+            error += (across * angle + 0.5 * np.abs(along) * angle**2) @ w.most
         return error
 
 

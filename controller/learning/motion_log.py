@@ -64,13 +64,14 @@ class MotionLog:
         space: the plane or space.
         time: (N+1,) [s].
         orientation: (N+1, 4) measured quaternions, object axes to world.
-        force, moment: (N, 3) known wrench at `lever`, object axes [N, N m]; each value acts from its time until the
-            next one, within half a step, fixed to the object or to the world.
+        force, moment: (N, 3) known wrench at `lever`, object axes when its step begins [N, N m]. Its impulse acts within
+            its step, all of the time or at once, and it turns with the object or stays as it is in the world.
         lever: (3,) from the contact to the point at which the wrench acts, the believed CoM, object axes [m].
         gravity: (3,) world axes [m/s^2].
         axes: (A, 3) unit vectors, world axes, about which the contact transmits no moment.
         angular_velocity: (N+1, 3) measured, world axes [rad/s]; None: not measured.
-        contact_force: (N, 3) sum of the contact forces on the object, world axes [N]; nan: not measured in that step.
+        contact_force: (N, 3) sum of the contact forces on the object, world axes, the mean of each step [N]; nan: not
+            measured in that step.
         position: (N+1, 3) measured, of the point at which the wrench acts, world axes [m]; None: not measured.
         contact: (N,) what the contact does in each step: one of `CONTACT`, by number.
     """

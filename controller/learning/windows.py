@@ -39,13 +39,15 @@ class Weights(NamedTuple):
 
     Attributes:
         around: (n+1,) integral of w over the half steps around each state [s].
-        step: (n,) integral of w over each step [s].  size: (n,) likewise, of |w|.
+        step: (n,) integral of w over each step [s].  size: (n,) likewise, of |w|, or a little more.
+        most: (n,) duration of each step times the greatest |w| in it [s].
         slope: (n,) derivative of w in each step [1/s].  duration: (n,) of each step [s].
     """
 
     around: Array
     step: Array
     size: Array
+    most: Array
     slope: Array
     duration: Array
 
@@ -89,5 +91,6 @@ def weights(window: Window, time: Array) -> Weights:
     around = np.zeros_like(w)
     around[:-1] += 0.25 * duration * (w[:-1] + middle)
     around[1:] += 0.25 * duration * (middle + w[1:])
-    size = 0.5 * duration * (np.abs(w[1:]) + np.abs(w[:-1]))
-    return Weights(around, duration * middle, size, np.diff(w) / duration, duration)
+    ends = np.abs(w[:-1]), np.abs(w[1:])
+    size, most = 0.5 * duration * (ends[0] + ends[1]), duration * np.maximum(*ends)
+    return Weights(around, duration * middle, size, most, np.diff(w) / duration, duration)
