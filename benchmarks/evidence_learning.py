@@ -27,9 +27,9 @@ SIGMAS = 3.0
 
 
 def learned(run: PivotRun) -> tuple[bool, np.ndarray, np.ndarray, bool, tuple[float, float]]:
-    """Of one run: whether the set holds the truth; widths of the box after over before, by motion alone and with contact
-    forces; whether least squares have the first moment within three standard deviations; and seconds to make the cuts of
-    the motion, and to intersect with them."""
+    """Of one run: whether the set holds the truth; widths of the box after over before, by motion alone and with
+    contact forces; whether least squares have the first moment within three standard deviations; and seconds to make
+    the cuts of the motion, and to intersect with them."""
     estimator, squares = SetMembership(run.unknowns), RecursiveLeastSquares(run.unknowns)
     before = estimator.set.high - estimator.set.low
     start = perf_counter()

@@ -17,7 +17,7 @@ def test_it_removes_a_steady_error(name: str) -> None:
 
 
 def test_it_does_not_wind_up() -> None:
-    """From 5 deg off, bounds hold the wrench back. Integral action sums the error up meanwhile, and loses the object."""
+    """From 5 deg off, bounds hold the wrench back. Integral action sums up the error, and then loses the object."""
     keys = {"seconds": 1.2, "spread": 6.0, "world": {"mass": 1.05}, "force_max": "0.6w", "moment_max": "0.5w"}
     swung = {}
     for stage in ("integral", "disturbance"):

@@ -101,7 +101,9 @@ def test_what_is_not_measured_is_not_told(tmp_path: Path, said: Said) -> None:
     table = {name: values for name, values in columns(run).items() if not name.startswith("force")}
     code, out, err = said(str(write(tmp_path / "log.csv", table)), *options(run))
     assert (code, err) == (0, "")
-    assert "mu                         0 or more             0 or more              it takes a contact force" in out
+    assert (
+        "mu                         0 or more             0 or more              needs a measured contact force" in out
+    )
     assert "a pivot on a contact that sticks tells only m c and I_P" in out
     assert "theta 0.1 deg" in out
     assert "hang together by m c" in out

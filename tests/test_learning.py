@@ -260,9 +260,9 @@ def test_about_an_edge_only_the_parts_across_it_are_told() -> None:
     assert told["m c_x"].told
     assert told["m c_z"].told
     assert told["I_P yy"].told
-    assert told["m c_y"].why == "no balance depends on it: about an edge only the parts across it count"
-    assert told["I_P yz"].why == "the object did not turn so that it counts"
-    assert told["mu"].why == "it takes a contact force"
+    assert told["m c_y"].why == "no balance depends on it: about an edge only the components across it do"
+    assert told["I_P yz"].why == "no balance depends on it: the object does not turn about that axis"
+    assert told["mu"].why == "needs a measured contact force"
 
 
 def test_momentum_needs_no_rates() -> None:

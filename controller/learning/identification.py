@@ -124,7 +124,7 @@ def _why_friction(log: MotionLog, bounds: FrictionBounds, before: Interval, seve
     if said:
         return " and ".join(said)
     if np.isnan(log.contact_force).all():
-        return "it takes a contact force"
+        return "needs a measured contact force"
     if several and (log.contact == SLIDES).any():
         return "several contacts may slip in different directions"
     return "no slip, and no more friction was used than was known to be there"

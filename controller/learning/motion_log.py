@@ -64,8 +64,8 @@ class MotionLog:
         space: the plane or space.
         time: (N+1,) [s].
         orientation: (N+1, 4) measured quaternions, object axes to world.
-        force, moment: (N, 3) known wrench at `lever`, object axes when its step begins [N, N m]. Its impulse acts within
-            its step, all of the time or at once, and it turns with the object or stays as it is in the world.
+        force, moment: (N, 3) known wrench at `lever`, object axes when its step begins [N, N m]. Its impulse acts
+            within its step, spread over it or at once, and turns with the object or stays as it is in the world.
         lever: (3,) from the contact to the point at which the wrench acts, the believed CoM, object axes [m].
         gravity: (3,) world axes [m/s^2].
         axes: (A, 3) unit vectors, world axes, about which the contact transmits no moment.

@@ -106,14 +106,18 @@ def _why(
         return "it was known", False
     weighed = bool((seen.force > 0.0).any())
     if name == "mass":
-        return ("the errors hide it" if weighed else f"{PRODUCT}: it takes a contact force or a lift-off"), False
+        return (
+            "the measurement errors hide it" if weighed else f"{PRODUCT}: needs a contact force or a lift-off"
+        ), False
     if name == "inertia":
         return f"{PRODUCT}: m |c|^2 is not known well enough to be taken from I_P", False
     if visible:
-        return ("the errors hide it" if name in unknowns.names else "mass and m c are not known well enough"), False
+        return (
+            "the measurement errors hide it" if name in unknowns.names else "mass and m c are not known well enough"
+        ), False
     if name.startswith("I_P"):
-        return "the object did not turn so that it counts", False
-    return "no balance depends on it: about an edge only the parts across it count", False
+        return "no balance depends on it: the object does not turn about that axis", False
+    return "no balance depends on it: about an edge only the components across it do", False
 
 
 def _others(name: str) -> str:

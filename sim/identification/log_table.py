@@ -1,4 +1,4 @@
-"""A user's own table, read from a CSV or Parquet file: its columns as numbers, and one clear error where it has none."""
+"""A user's own table, read from a CSV or Parquet file: its columns as numbers, or one clear error."""
 
 import csv
 from collections.abc import Mapping
