@@ -4,6 +4,7 @@ import csv
 import json
 import sys
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,13 @@ def said(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> 
         return code, *capfd.readouterr()
 
     return call
+
+
+@cache
+def planar_run() -> PivotRun:
+    """A run whose table is good."""
+    (run,) = pivot_runs(23, 1, 2)
+    return run
 
 
 def columns(run: PivotRun) -> dict[str, np.ndarray]:
@@ -148,7 +156,7 @@ LATE, GAP = np.arange(401.0)[::-1], np.where(np.arange(401) == 7, np.nan, 1.0)
 def test_a_bad_table_is_one_clear_error(
     change: Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]], message: str, tmp_path: Path, said: Said
 ) -> None:
-    (run,) = pivot_runs(23, 1, 2)
+    run = planar_run()
     refused(said(str(write(tmp_path / "log.csv", change(columns(run)))), *options(run)), message)
 
 
@@ -160,7 +168,7 @@ def refused(told: tuple[int, str, str], message: str) -> None:
 
 
 def test_a_bad_file_or_option_is_one_clear_error(tmp_path: Path, said: Said) -> None:
-    (run,) = pivot_runs(23, 1, 2)
+    run = planar_run()
     own, good = options(run), str(write(tmp_path / "log.csv", columns(run)))
     (tmp_path / "text.parquet").write_text("no")
     (tmp_path / "text.nc").write_text("no")

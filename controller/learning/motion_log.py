@@ -1,6 +1,6 @@
 """What was measured while an object turned about a contact that sticks, and how wrong the measurements may be."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -116,22 +116,6 @@ class MotionLog:
         span = self.time[apart] - self.time
         return float((angle[whole] / span[whole]).max())
 
-    def part(self, first: int, last: int) -> Self:
-        """The steps from `first` to `last` - 1."""
-        states = slice(first, last + 1)
-        rates = None if self.angular_velocity is None else self.angular_velocity[states]
-        return replace(
-            self,
-            time=self.time[states],
-            orientation=self.orientation[states],
-            force=self.force[first:last],
-            moment=self.moment[first:last],
-            angular_velocity=rates,
-            contact_force=self.contact_force[first:last],
-            position=None if self.position is None else self.position[states],
-            contact=self.contact[first:last],
-        )
-
 
 def motion_log(
     time: ArrayLike,
@@ -147,20 +131,17 @@ def motion_log(
     position: ArrayLike | None = None,
     contact: ArrayLike | None = None,
 ) -> MotionLog:
-    """A log in the plane or in space, as the length of `lever` says.
+    """A log in the plane or in space, as the length of `lever` says; what is left out was not measured.
 
     Args:
         time: (N+1,) rising [s].
         orientation: angles (N+1,) [rad] in the plane, quaternions (N+1, 4) in space.
         wrench: (N, 3) force along u and v and moment, or (N, 6) force and moment; see `MotionLog` [N, N m].
-        lever: (d,) from the contact to the believed CoM, object axes [m].
-        gravity: (d,) or (3,) world axes [m/s^2].
+        lever: (d,) see `MotionLog` [m].  gravity: (d,) or (3,) world axes [m/s^2].
         here: the plane with its table, or space; by default the plane of x and z.
-        axes: (A, 3) see `MotionLog`; by default all that the object can turn about. Of an edge that is held at both
-            ends it is the edge alone.
-        angular_velocity: (N+1,) or (N+1, 3), contact_force: (N, d) or (N, 3), position: (N+1, d) or (N+1, 3),
-            contact: (N,) as in `MotionLog`, in the plane of x and z also with planar values; by default not measured,
-            and sticking all the time.
+        axes: (A, 3) by default all that the object can turn about; of an edge with a contact at both ends, the edge.
+        angular_velocity: (N+1,) or (N+1, 3).  contact_force: (N, d) or (N, 3).  position: (N+1, d) or (N+1, 3).
+        contact: (N,) by default the contact sticks all the time.
 
     Raises:
         ValueError: an array that does not fit the others; it is named.
@@ -177,10 +158,6 @@ def motion_log(
     acting = array("wrench", wrench, (steps, 3 * dim - 3)) @ where.wrench_map
     down = array("gravity", gravity, (None,))
     around = where.axial(1.0)[None] if planar else np.eye(3)
-    rates = None
-    if angular_velocity is not None:
-        rates = array("angular_velocity", angular_velocity, (states,) if planar else (states, 3))
-        rates = where.axial(rates) if planar else rates
     does = np.zeros(steps, np.int8) if contact is None else array("contact", contact, (steps,)).astype(np.int8)
     if not np.isin(does, range(len(CONTACT))).all():
         raise fail("contact", does, "0 (sticks), 1 (slides), 2 (open) or 3 (other) in each step")
@@ -195,11 +172,20 @@ def motion_log(
         lever=where.lift(arm),
         gravity=down if down.size == 3 else where.lift(array("gravity", down, (dim,))),
         axes=around if axes is None else array("axes", axes, (None, 3)),
-        angular_velocity=rates,
+        angular_velocity=_rates(where, angular_velocity, states),
         contact_force=_contact_forces(where, contact_force, does),
         position=None if position is None else _lifted(where, "position", position, states),
         contact=frozen(does),
     )
+
+
+def _rates(here: Space, given: ArrayLike | None, rows: int) -> Array | None:
+    """(rows, 3) angular velocities, world axes, of planar rates (rows,) or of such; None of none."""
+    if given is None:
+        return None
+    if here.dim == 2:
+        return here.axial(array("angular_velocity", given, (rows,)))
+    return array("angular_velocity", given, (rows, 3))
 
 
 def _lifted(here: Space, name: str, value: ArrayLike, rows: int) -> Array:

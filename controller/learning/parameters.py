@@ -53,7 +53,8 @@ def parameters(
         stages: the set before, after the balances of moments, and after those of forces.
         mean: (n,) estimate of the unknowns.
     """
-    told = [_intervals(unknowns, stage) for stage in stages]
+    known = {id(stage): _intervals(unknowns, stage) for stage in {id(each): each for each in stages}.values()}
+    told = [known[id(stage)] for stage in stages]
     estimates = _estimates(unknowns, mean)
     found = []
     for name, unit in _named(unknowns):

@@ -6,7 +6,7 @@ import numpy as np
 from pivoting.controller.validate import Array, frozen
 from scipy.optimize import linprog
 
-MOST = 128  # inequalities that are kept without looking for redundant ones
+MOST = 400  # inequalities that are kept without looking for redundant ones
 ROUNDING = 1e-10  # of the size of a row: a bound is loosened by so much, which is more than rounding can take away
 
 

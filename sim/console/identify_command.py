@@ -26,6 +26,7 @@ class _Interval(click.ParamType):
     name = "LO:HI"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+        """(low, high) of text, or of what was converted already."""
         if isinstance(value, tuple):
             return value
         parts = value.split(":")
@@ -44,6 +45,7 @@ class _Numbers(click.ParamType):
     name = "A,B,..."
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """(n,) of text."""
         try:
             found = np.array([float(part) for part in value.split(",")])
         except ValueError:
@@ -59,6 +61,7 @@ class _Box(click.ParamType):
     name = "LO:HI,..."
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """(n, 2) of text."""
         return np.array([_Interval().convert(part, param, ctx) for part in value.split(",")])
 
 
