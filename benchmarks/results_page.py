@@ -91,6 +91,23 @@ def formulations_table() -> str:
     return table(["", "no floor", "50 N"], [[row[0], row[2], row[4]] for row in cells])
 
 
+def learning_table() -> str:
+    """How much narrower the intervals are after one pivot."""
+    values, rows = figures("learning"), []
+    for kind in dict.fromkeys(key.partition(": ")[0] for key in values):
+        own = {key.removeprefix(f"{kind}: "): value for key, value in values.items() if key.startswith(f"{kind}: ")}
+        moments = [value for key, value in own.items() if key.startswith("m c_") and key.endswith("median")]
+        cells = ", ".join(f"{value:.2f}" for value in moments)
+        inertia, mass = (
+            own["I_P: after / before, greatest median"],
+            own["m: after / before, with contact forces, median"],
+        )
+        rows.append(
+            [kind, cells, f"{inertia:.2f}", f"{mass:.2f}", f"{own['the truth was lost']:.0f} of {own['runs']:.0f}"]
+        )
+    return table(["", "m c, each component", "inertia about the contact", "mass", "truth lost"], rows)
+
+
 def loop_table() -> str:
     """Closed loop against physics alone."""
     values = figures("loop")
@@ -188,6 +205,7 @@ PARTS: dict[str, Callable[[], str]] = {
         evidence_table,
         pyramid_table,
         formulations_table,
+        learning_table,
         loop_table,
         horizon_table,
         compile_table,

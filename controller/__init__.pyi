@@ -1,6 +1,17 @@
 from .solvers.clarabel_workspace import ClarabelWorkspace as ClarabelWorkspace
 from .contacts import Contact as Contact
 from .control_laws import Body as Body, Law as Law
+from .learning.friction import friction_bounds as friction_bounds
+from .learning.identification import Identification as Identification, identify as identify
+from .learning.least_squares import RecursiveLeastSquares as RecursiveLeastSquares
+from .learning.motion_log import (
+    MeasurementErrors as MeasurementErrors,
+    MotionLog as MotionLog,
+    motion_log as motion_log,
+)
+from .learning.parameters import Parameter as Parameter
+from .learning.set_membership import SetMembership as SetMembership
+from .learning.unknowns import Unknowns as Unknowns
 from .motion import Motion as Motion
 from .planning.horizon import BodyState as BodyState, Horizon as Horizon
 from .planning.receding_horizon import RecedingHorizon as RecedingHorizon

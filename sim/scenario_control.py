@@ -42,6 +42,11 @@ class Decided(NamedTuple):
 
 def stages_of(begun: Begun, observe: Observe | None = None) -> Stages:
     """The stages around the control that the scenario asks for, and an observer of the user's own."""
+    body = begun.belief.attached.body
+    if begun.case.disturbance and body.drag is not None:
+        raise ModelError(
+            f"body = {body.name!r}: a disturbance observer knows no joint damping or friction; must have none"
+        )
     stages = build_stages(begun.case.stages, begun.setting)
     return stages if observe is None else stages._replace(observe=(*stages.observe, observe))
 
@@ -63,7 +68,9 @@ def decide(
     laws = [_law_control(begun, *each) for each in zip(solvers, stances, strict=True)]
     planned = open_loop or case.plan_hz is not None
     if len(stances) > 1 and (planned or stages.correct):
-        raise fail("landing", "held", "ignored with a plan or integral action, which know one stance")
+        raise fail(
+            "landing", "held", "ignored with a plan, integral action or a disturbance observer, which know one stance"
+        )
     control: Control
     if own is not None:
         control = OwnControl(own, begun.told, dt, begun.setting.first_world)

@@ -37,8 +37,7 @@ class WorstCase(NamedTuple):
 
     Attributes:
         world: that was found.  force: (K, d) its contact forces, contact axes [N].
-        slack: how far the closest of all conditions is from being violated [N]: mu f_n - |f_t|, over mu, or f_n - f_min;
-            negative where one is.
+        slack: of the closest of all conditions, f_n - |f_t| / mu and f_n - f_min [N]; negative where one is violated.
     """
 
     world: World

@@ -1,4 +1,4 @@
-"""The command line: `pivoting example | list | contacts | run | sweep | render | view`.
+"""The command line: `pivoting example | list | contacts | run | sweep | render | view | identify`.
 
 Exit 0: pass, 1: fail, 2: one line of why.
 """
@@ -13,6 +13,7 @@ from typing import Any
 import click
 from pivoting import __version__
 from pivoting.errors import PivotingError
+from pivoting.sim.console.identify_command import identify
 from pivoting.sim.console.scenario_options import scenario_options
 from pivoting.sim.console.stdout import JsonOutput, console, json_option
 from pivoting.sim.console.sweep_command import sweep
@@ -273,6 +274,9 @@ def contacts(model: Path, body: str, support: str | None, least: float, as_json:
     else:
         print_contacts(console(), found)
     return 0
+
+
+cli.add_command(identify)
 
 
 def _asked_name(scenario: str | None, own: dict[str, Any]) -> str:

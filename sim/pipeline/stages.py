@@ -323,4 +323,6 @@ def build_stages(values: Mapping[str, float], setting: Setting) -> Stages:
         module, _, name = place.partition(":")
         made = getattr(import_module(module), name)(value, setting)
         built[made.slot].append(made)
+        if made.slot == "observe" and hasattr(made, "correct"):  # what it observes, it takes away again
+            built["correct"].append(made.correct)
     return Stages(**{slot: tuple(stages) for slot, stages in built.items()})

@@ -243,6 +243,17 @@ class IdealKeys(ObjectKeys):
         stage="pivoting.sim.pipeline.integral_action:IntegralAction",
     )
 
+    disturbance: float = key(
+        0.0,
+        "rate at which a disturbance observer removes a steady error of the angle, without winding up within bounds",
+        group=STAGES,
+        unit="1/s",
+        at_least=0.0,
+        at_most=1e5,
+        needs=Needs("law", ("dynamic",)),
+        stage="pivoting.sim.pipeline.disturbance_observer:DisturbanceObserver",
+    )
+
     dt: float | None = key(
         None,
         "time step",
