@@ -29,3 +29,6 @@ from .solvers.solve import methods as methods, pyramid_excess as pyramid_excess,
 from .wrench_bounds import WrenchBounds as WrenchBounds
 from .wrench_controller import WrenchController as WrenchController
 from .wrench_problem import WrenchProblem as WrenchProblem, wrench_weight as wrench_weight
+from .uncertainty.guarantee import Guarantee as Guarantee
+from .uncertainty.uncertainty import Interval as Interval, Uncertainty as Uncertainty
+from .uncertainty.worst_case import WorstCase as WorstCase, worst_case as worst_case

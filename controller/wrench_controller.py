@@ -15,11 +15,12 @@ from pivoting.controller.belief import Belief, BelievedObject, HeldContacts, Wre
 from pivoting.controller.contacts import Contact
 from pivoting.controller.control_laws import Body, Law
 from pivoting.controller.kernels.compiled_step import state_cones, state_problem
-from pivoting.controller.kernels.workspace import MEMBERS, guard, several_workspace, workspace
+from pivoting.controller.kernels.workspace import MEMBERS, Guard, guard, several_workspace, workspace
 from pivoting.controller.motion import Motion
 from pivoting.controller.plane_and_space import Space, space
 from pivoting.controller.rotations import IDENTITY, rotation_matrix
 from pivoting.controller.uncertainty.believed_set import believed_set, check_set, guarded_cones
+from pivoting.controller.uncertainty.guarantee import Guarantee
 from pivoting.controller.uncertainty.uncertainty import Uncertainty
 from pivoting.controller.units import Units, lever, units
 from pivoting.controller.validate import Array, array, fail, number, positive_definite
@@ -165,15 +166,11 @@ class WrenchController:
             external: (nw,) known wrench on the object besides gravity, contacts and the controller's own, such as that
                 of damped joints, about the CoM, object axes [N, N m].
         """
-        target = Motion(state.orientation) if desired is None else desired
-        measured = self.space.lift_motion(state)[:2]
-        J, required = self._stated(measured, self.space.lift_motion(target))
+        J, required, measured = self._at(state, desired)
         held, floors, apex = self.belief.contacts, self.belief.contacts.f_min, None
         if self.uncertainty is not None:
-            scratch = guard(len(required), len(self.contacts), self.space.dim)
-            seen = [np.array(values) for values in measured]
-            members, _ = state_cones(self.belief, *seen, np.empty((3, 3)), required, scratch)
-            apex, floors = scratch.apex[:members], scratch.floor
+            cones, members, _ = self._moved(measured, required)
+            apex, floors = cones.apex[:members], np.maximum(cones.floor, 0.0)
         if external is not None:
             required -= array("external", external, required.shape)
         # as it was given, where it is: (1 - margin) mu is to be the same to the last bit
@@ -181,6 +178,31 @@ class WrenchController:
         return WrenchProblem(
             J, required, mu, f_min=floors, margin=self.margin, Q_w=self.Q_w, Q_f=self.Q_f, apex=apex
         )  # fmt: skip
+
+    def guarantee(self, state: Motion, desired: Motion | None = None) -> Guarantee:
+        """What the answer to `problem` guarantees for the worlds of the controller's set; arguments as there.
+
+        Raises:
+            ValueError: the controller has no set.
+        """
+        if self.uncertainty is None:
+            raise fail("uncertainty", None, "an Uncertainty: without one there is nothing to guarantee")
+        _, required, measured = self._at(state, desired)
+        _, members, excess = self._moved(measured, required)
+        one = len(self.contacts) == 1
+        return Guarantee("strong" if one else "weak", float(excess), members == 1 or excess == 0.0)
+
+    def _at(self, state: Motion, desired: Motion | None) -> tuple[Array, Array, tuple[Array, ...]]:
+        """J, the required wrench, and orientation and angular velocity (world axes) as they are measured."""
+        target = Motion(state.orientation) if desired is None else desired
+        measured = self.space.lift_motion(state)[:2]
+        return *self._stated(measured, self.space.lift_motion(target)), measured
+
+    def _moved(self, measured: tuple[Array, ...], required: Array) -> tuple[Guard, int, float]:
+        """The cones that the members ask for, how many members there are, and the excess [N]."""
+        scratch = guard(len(required), len(self.contacts), self.space.dim)
+        seen = [np.array(values) for values in measured]
+        return scratch, *state_cones(self.belief, *seen, np.empty((3, 3)), required, scratch)
 
     def _stated(self, measured: tuple[Array, ...], desired: tuple[Array, ...]) -> tuple[Array, Array]:
         """J (nw, K d) and the required wrench (nw,) at q, omega for q_d, omega_d, alpha_d, all in world axes."""

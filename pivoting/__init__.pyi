@@ -1,5 +1,6 @@
 from .controller.control_laws import Body as Body, Law as Law
 from .controller.contacts import Contact as Contact
+from .controller.uncertainty.uncertainty import Uncertainty as Uncertainty
 from .controller.solution import Solution as Solution
 from .controller.solvers.solve import solve as solve
 from .controller.wrench_controller import WrenchController as WrenchController

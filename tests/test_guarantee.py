@@ -125,6 +125,22 @@ def test_no_member_in_space_violates_a_cone(K: int, more: dict[str, float]) -> N
         assert worst_case(controller, state, answer.wrench).slack / load(controller) >= -1e-9
 
 
+def test_what_is_guaranteed_is_said() -> None:
+    """Strong stability of one contact, weak of two; a proof in the plane; an excess of a few per cent of the load."""
+    rng = np.random.default_rng(6)
+    for _ in range(SETS):
+        for made, stability in ((planar(rng, "contact"), "strong"), (planar(rng, "com"), "strong"),
+                                (spatial(rng, 1), "strong"), (spatial(rng, 2), "weak")):  # fmt: skip
+            controller, state, desired = made
+            said = controller.guarantee(state, desired)
+            assert said.stability == stability
+            assert 0.0 <= said.excess < 0.1 * load(controller)
+            if controller.space.dim == 2:
+                assert said.proved
+            if controller.uncertainty is not None and controller.uncertainty.about == "contact":
+                assert said.excess == 0.0
+
+
 def test_disturbances_in_the_plane_violate_no_cone() -> None:
     """A shove, and errors of what is measured, belong to the set; without them in the set they do violate it."""
     rng, violated = np.random.default_rng(8), 0
