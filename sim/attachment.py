@@ -138,13 +138,12 @@ def attach(
             one point in the plane, where [(u, v)] along the in-plane axes will do as well [m]. Of what rolls, such as
             the end of a capsule, the centre.
         radius: of the round end that rolls, 0 of a point; one number, or one for each contact [m].
-        law: default `Law.dynamic()`.
-        mu: friction to plan with; default what MuJoCo combines from the geoms.
-        margin: share of mu kept unused; exactly on the cone's edge nothing sticks.
-        f_min: floor of the normal force [N].
-        Q_w, Q_f: weights, see `WrenchProblem`; Q_w defaults to the lever of the contact as characteristic length.
+        law: default `Law.dynamic()`.  mu: friction to plan with; default what MuJoCo combines from the geoms.
+        margin: share of mu kept unused; exactly on its edge nothing sticks.
+        f_min: floor of the normal force [N].  Q_w, Q_f: weights, see `WrenchProblem`; by default Q_w has
+            the lever of the contact as its characteristic length.
         support: name of the geom that the body stands on; default what is under it in the first keyframe, or at qpos0.
-        uncertainty: what is not known of the body, about what is read of the model; every member's contact is to stick.
+        uncertainty: what is not known of the body, about what is read of the model.
 
     Raises:
         ModelError: the model cannot be served, with the reason.

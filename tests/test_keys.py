@@ -218,7 +218,7 @@ def test_what_was_set_is_kept_in_the_changes() -> None:
     assert case.change(**{"world.mu": 0.2}).change(mu=0.25).changes == {"mu": 0.25}
     own = {"mu", "mass", "inertia", "com", "com_x", "com_y", "com_z", "size", "incline", "gravity"}
     assert set(HIDDEN_KEYS) == own
-    assert set(CONTROL_KEYS) == {"law", "bandwidth", "damping", "margin", "f_min", "length"}
+    assert set(CONTROL_KEYS) == {"law", "bandwidth", "damping", "margin", "guarantee", "f_min", "length"}
 
 
 def test_a_scenario_of_ones_own_differs_from_the_defaults() -> None:

@@ -6,7 +6,7 @@ from pivoting.controller.contacts import fill_jacobian
 from pivoting.controller.kernels.compilation import kernel, subroutine
 from pivoting.controller.kernels.guarded_interior_point import guarded_wrench
 from pivoting.controller.kernels.interior_point import contact_wrench
-from pivoting.controller.kernels.planar_closed_form import planar_wrench, state_from_tip
+from pivoting.controller.kernels.planar_closed_form import moved_planar_wrench, planar_wrench
 from pivoting.controller.kernels.required_wrench import fill_required
 from pivoting.controller.kernels.worst_member_forces import move_cones
 from pivoting.controller.kernels.worst_planar_force import move_planar_cone
@@ -117,10 +117,6 @@ def step_worlds(  # type: ignore[no-untyped-def]
             members, _ = move_cones(R, omega, b, moved, held, wrench_map, set_of(unknown, mine), guard)
         for row in range(nw):
             b[row] -= external[i % external.shape[0], row]
-        if unknown is not None and planar is not None:
-            for a in range(2):
-                guard.tip[a] = guard.apex[0, 0, a]
-            state_from_tip(J, b, Q_f, f_min, guard)
         ball, multiplier, Q = -1, 0.0, Q_w
         for attempt in range(ATTEMPTS + 1):
             if bounds is not None:
@@ -130,13 +126,12 @@ def step_worlds(  # type: ignore[no-untyped-def]
             if planar is not None and unknown is None:
                 residual = planar_wrench(J, b, Q, Q_f, mu, f_min, force, wrench, planar)
             if planar is not None and unknown is not None:
-                residual = planar_wrench(J, guard.left, Q, Q_f, mu, guard.floor, force, wrench, planar, guard.linear)
+                residual = moved_planar_wrench(J, b, Q, Q_f, mu, guard, force, wrench, planar)
             if several is not None and unknown is None:
                 residual = contact_wrench(J, b, Q, Q_f, mu, f_min, force, wrench, several)
             if several is not None and unknown is not None:
-                residual = guarded_wrench(
-                    J, b, Q, Q_f, mu, guard.floor, guard.apex[:members], force, wrench, several, guard
-                )
+                tips = guard.apex[:members]
+                residual = guarded_wrench(J, b, Q, Q_f, mu, guard.floor, tips, force, wrench, several, guard)
             if bounds is None:
                 break
             if attempt == 0:
@@ -153,8 +148,6 @@ def step_worlds(  # type: ignore[no-untyped-def]
             multiplier = root[0]
             if attempt >= ATTEMPTS - 1 or not multiplier <= HEAVIEST * root[5]:  # out of reach: as without bounds
                 ball = -1
-        if unknown is not None and planar is not None:
-            force[0], force[1] = force[0] + guard.tip[0], force[1] + guard.tip[1]
         out[i, last] = residual
         if not np.isfinite(residual):
             status[i] = FAILED

@@ -81,7 +81,7 @@ def guarded_wrench(J, b, Q_w, Q_f, mu, f_min, apex, f, w, scratch, guard):  # ty
         Others: as `contact_wrench`.
     """
     K, dim = apex.shape[1:]
-    a, floor, left, linear, chosen = guard.tip, guard.floor, guard.left, guard.linear, guard.chosen
+    a, left, linear, chosen = guard.tip, guard.left, guard.linear, guard.chosen
     for k in range(K):
         chosen[k] = 0
         for v in range(1, apex.shape[0]):
@@ -89,22 +89,20 @@ def guarded_wrench(J, b, Q_w, Q_f, mu, f_min, apex, f, w, scratch, guard):  # ty
                 chosen[k] = v
     for _ in range(CHOICES):  # one cone at each contact often decides, and which it is shows
         for k in range(K):
-            floor[k] = f_min[k]
             for i in range(dim):
                 a[dim * k + i] = apex[chosen[k], k, i]
         state_from_tip(J, b, Q_f, f_min, guard)
-        residual = contact_wrench(J, left, Q_w, Q_f, mu, floor, f, w, scratch, linear)
+        residual = contact_wrench(J, left, Q_w, Q_f, mu, guard.height, f, w, scratch, linear)
         for i in range(f.shape[0]):
             f[i] += a[i]
         if not _choose_again(apex, mu, f, chosen):
             return residual
     cones = list_cones(apex, mu, scratch)
     for k in range(K):
-        floor[k] = f_min[k]
         for i in range(dim):
             a[dim * k + i] = apex[0, k, i]
     state_from_tip(J, b, Q_f, f_min, guard)
-    residual = _from_apex(J, left, Q_w, Q_f, mu, floor, cones, f, w, scratch, linear)
+    residual = _from_apex(J, left, Q_w, Q_f, mu, guard.height, cones, f, w, scratch, linear)
     for i in range(f.shape[0]):
         f[i] += a[i]
     return residual

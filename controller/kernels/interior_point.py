@@ -60,18 +60,18 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch, linear=None):  # ty
         work.piece[0] = piece
         for i in range(n):
             now[i] = f[i]
-        best = _try(J, b, Q_w, Q_f, mu, f_min, axes, 1, f, w, best, work, linear)
+        best = _try(J, b, Q_w, Q_f, mu, f_min, 1, f, w, best, work, linear)
         if best <= EXACT:
             return best
     if _nothing_pulls(h, mu, f_min, axes):  # f = 0 is optimal, exactly
         for i in range(n):
             now[i] = 0.0
-        return _try(J, b, Q_w, Q_f, mu, f_min, axes, 0, f, w, best, work, linear)
+        return _try(J, b, Q_w, Q_f, mu, f_min, 0, f, w, best, work, linear)
     free_minimum(work.H, h, work)
     if _inside(mu, f_min, axes, now):
         for i in range(K):
             work.piece[i] = INSIDE
-        best = _try(J, b, Q_w, Q_f, mu, f_min, axes, GUESSES, f, w, best, work, linear)
+        best = _try(J, b, Q_w, Q_f, mu, f_min, GUESSES, f, w, best, work, linear)
         if best <= EXACT:
             return best
     cones, gap, left, size = start(mu, f_min, axes, work)
@@ -81,7 +81,7 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch, linear=None):  # ty
             break
         if gap + left <= goal * size:
             _guess(mu, f_min, work)
-            best = _try(J, b, Q_w, Q_f, mu, f_min, axes, GUESSES, f, w, best, work, linear)
+            best = _try(J, b, Q_w, Q_f, mu, f_min, GUESSES, f, w, best, work, linear)
             if best <= EXACT or goal < 1e-13:
                 break
             goal *= 1e-2
@@ -98,7 +98,7 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch, linear=None):  # ty
             break
         gap, left, size = advance(mu, f_min, axes, alpha, work)
     if best > EXACT:
-        best = _try(J, b, Q_w, Q_f, mu, f_min, axes, 0, f, w, best, work, linear)
+        best = _try(J, b, Q_w, Q_f, mu, f_min, 0, f, w, best, work, linear)
     return best if best < np.inf else np.nan
 
 
@@ -112,9 +112,9 @@ def _closed_form(J, b, Q_w, Q_f, H, h, mu, f_min, f, w, pull, linear):  # type: 
 
 
 @subroutine
-def _try(J, b, Q_w, Q_f, mu, f_min, axes, polishes, f, w, best, work, linear):  # type: ignore[no-untyped-def]
+def _try(J, b, Q_w, Q_f, mu, f_min, polishes, f, w, best, work, linear):  # type: ignore[no-untyped-def]
     """Polish the iterate, or with no polishes take it as it is; keep it in f and w if its certificate is better."""
-    trial_f, trial_w = work.trial_f, work.trial_w
+    axes, trial_f, trial_w = work.axes, work.trial_f, work.trial_w
     for _ in range(max(polishes, 1)):
         for i in range(f.shape[0]):
             trial_f[i] = work.now[i]

@@ -119,9 +119,9 @@ def state_from_tip(J, b, Q_f, f_min, guard):  # type: ignore[no-untyped-def]
     """State a problem in f - a, a being the cones' tip (n,): the wrench that is left, the linear cost, the floors.
 
     Args:
-        guard: a `Guard`, with the tip and with the floors [N] from 0, which become those from the tip.
+        f_min: (K,) floors [N], from 0.  guard: a `Guard`, with the tip; left, linear and height are written.
     """
-    a, floor, left, linear = guard.tip, guard.floor, guard.left, guard.linear
+    a, height, left, linear = guard.tip, guard.height, guard.left, guard.linear
     nw, n = J.shape
     for i in range(nw):
         left[i] = b[i]
@@ -133,7 +133,7 @@ def state_from_tip(J, b, Q_f, f_min, guard):  # type: ignore[no-untyped-def]
             linear[i] += Q_f[i, j] * a[j]
     K = f_min.shape[0]
     for c in range(K):
-        floor[c] = max(floor[c] - a[(c + 1) * (n // K) - 1], 0.0)
+        height[c] = max(f_min[c] - a[(c + 1) * (n // K) - 1], 0.0)
 
 
 @kernel
@@ -147,3 +147,12 @@ def planar_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch, linear=None):  # typ
     planar_force(work.H, work.h, mu[0], f_min[0], f)
     balancing_wrench(J, b, f, w)
     return kkt_residual(J, b, Q_w, Q_f, mu, f_min, w, f, work.pull, linear)
+
+
+@subroutine
+def moved_planar_wrench(J, b, Q_w, Q_f, mu, guard, f, w, scratch):  # type: ignore[no-untyped-def]
+    """The same for a cone whose tip and floor are in `guard`, a `Guard`."""
+    state_from_tip(J, b, Q_f, guard.floor, guard)
+    residual = planar_wrench(J, guard.left, Q_w, Q_f, mu, guard.height, f, w, scratch, guard.linear)
+    f[0], f[1] = f[0] + guard.tip[0], f[1] + guard.tip[1]
+    return residual

@@ -92,7 +92,8 @@ class Guard(NamedTuple):
     """Scratch for cones that are moved; the problem is stated from the apex of one cone at each contact, the tip."""
 
     tip: Array  # (n,)
-    floor: Array  # (K,): floors, from 0 and then from the tip
+    floor: Array  # (K,): floors, from 0
+    height: Array  # (K,): floors, from the tip
     left: Array  # (nw,): the wrench that is required beside forces at the tips
     linear: Array  # (n,): the linear cost of what the forces are more than that
     apex: Array  # (V, K, d): of all members, `MEMBERS`, or of one contact in the plane the one that they have in common
@@ -110,21 +111,6 @@ class Guard(NamedTuple):
 def guard(nw: int, K: int, dim: int) -> Guard:
     """The scratch for one problem size."""
     n, members = K * dim, 1 if K * dim == 2 else MEMBERS
-    shapes = (
-        (n,),
-        (K,),
-        (nw,),
-        (n,),
-        (members, K, dim),
-        (4, 2),
-        (3, 2),
-        (5,),
-        (4, 3),
-        (K, 5, 3),
-        (3, 3),
-        (K, dim),
-        (K, 2),
-    )
-    *first, corner = (np.zeros(shape) for shape in shapes[:6])
-    chosen, rest = np.zeros(K, dtype=np.int64), (np.zeros(shape) for shape in shapes[6:])
-    return Guard._make([*first, chosen, corner, *rest])
+    first, rest = ((n,), (K,), (K,), (nw,), (n,), (members, K, dim)), ((4, 2), (3, 2), (5,), (4, 3), (K, 5, 3), (3, 3))
+    arrays = (np.zeros(shape) for shape in (*rest, (K, dim), (K, 2)))
+    return Guard._make([*map(np.zeros, first), np.zeros(K, dtype=np.int64), *arrays])

@@ -49,6 +49,8 @@ def move_planar_cone(R, omega, b, moved, held, wrench_map, unknown, guard):  # t
         into(R, gravity[0], gravity[1], gravity[2]), held.mu[0], held.f_min[0], unknown, (guard.corner, guard.ends),
         guard.apex[0, 0],
     )  # fmt: skip
+    for axis in range(2):
+        guard.tip[axis] = guard.apex[0, 0, axis]
     return excess
 
 

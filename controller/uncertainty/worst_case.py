@@ -17,7 +17,7 @@ from scipy.optimize import differential_evolution, minimize, minimize_scalar
 STEPS = 25  # of a local search
 
 
-class World(NamedTuple):
+class PossibleWorld(NamedTuple):
     """What the world may be and do at one moment.
 
     Attributes:
@@ -40,12 +40,12 @@ class WorstCase(NamedTuple):
         slack: of the closest of all conditions, f_n - |f_t| / mu and f_n - f_min [N]; negative where one is violated.
     """
 
-    world: World
+    world: PossibleWorld
     force: Array
     slack: float
 
 
-def contact_forces(controller: WrenchController, state: Motion, wrench: ArrayLike, world: World) -> Array:
+def contact_forces(controller: WrenchController, state: Motion, wrench: ArrayLike, world: PossibleWorld) -> Array:
     """The contact forces (K, d) [N] if all contacts stick, by the equations of motion of the true object.
 
     Of several contacts they are the smallest that satisfy the equations.
@@ -123,7 +123,7 @@ def worst_case(
     return WorstCase(world, force, _slack(controller, force, q, world))
 
 
-def world_at(controller: WrenchController, shares: Array) -> World:
+def world_at(controller: WrenchController, shares: Array) -> PossibleWorld:
     """The world at shares in [0, 1] of all that is unknown: of a member, and (3,) each of push, tilt and spin."""
     known, dim = _known(controller), controller.space.dim
     unknown = known.unknowns
@@ -135,10 +135,10 @@ def world_at(controller: WrenchController, shares: Array) -> World:
         table = rotation_matrix(controller.base)
         push -= table[:, 1] * (table[:, 1] @ push)
         tilt, spin = (table[:, 1] * (table[:, 1] @ each) for each in (tilt, spin))
-    return World(known.at(np.clip(shares[:unknown], 0.0, 1.0)), push, tilt, spin)
+    return PossibleWorld(known.at(np.clip(shares[:unknown], 0.0, 1.0)), push, tilt, spin)
 
 
-def _slack(controller: WrenchController, force: Array, q: Array, world: World) -> float:
+def _slack(controller: WrenchController, force: Array, q: Array, world: PossibleWorld) -> float:
     """Of the forces (K, d), and of two of those that also squeeze each other, the greatest that can be had."""
     mu = _known(controller).mu
     low = np.array([(1.0 - controller.margin) * (each.mu if mu is None else mu.low) for each in controller.contacts])
