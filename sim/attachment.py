@@ -140,8 +140,7 @@ def attach(
         radius: of the round end that rolls, 0 of a point; one number, or one for each contact [m].
         law: default `Law.dynamic()`.  mu: friction to plan with; default what MuJoCo combines from the geoms.
         margin: share of mu kept unused; exactly on its edge nothing sticks.
-        f_min: floor of the normal force [N].  Q_w, Q_f: weights, see `WrenchProblem`; by default Q_w has
-            the lever of the contact as its characteristic length.
+        f_min: floor of the normal force [N].  Q_w, Q_f: weights, see `WrenchController`.
         support: name of the geom that the body stands on; default what is under it in the first keyframe, or at qpos0.
         uncertainty: what is not known of the body, about what is read of the model.
 
