@@ -19,7 +19,12 @@ from pathlib import Path
 
 BENCHMARKS = Path(__file__).parent
 DOCS = BENCHMARKS.parent / "docs"
-REDUCE: dict[str, Callable[[list[float]], float]] = {"max": max, "min": min, "sum": sum, "mm": lambda values: 1e3 * max(values)}
+REDUCE: dict[str, Callable[[list[float]], float]] = {
+    "max": max,
+    "min": min,
+    "sum": sum,
+    "mm": lambda values: 1e3 * max(values),
+}
 SCENARIO_COLUMNS = {
     "slip, mm": ("slip_max_m", 1e3),
     "of which MuJoCo's own, predicted, mm": ("slip_floor_m", 1e3),

@@ -53,8 +53,8 @@ def certified(
     wrench: Array,
     force: Array,
     message: str,
-    own: float,
     *,
+    own: float = np.nan,
     method: str,
     seconds: float,
     tolerance: float = TOLERANCE,
@@ -64,8 +64,8 @@ def certified(
 
     Args:
         message: what the solver reported; an error quotes it.
-        own: the relative KKT residual with the solver's own multipliers, computed here. Where contacts have several
-            cones it is the certificate; where each has one, the multipliers follow from the answer.
+        own: the relative KKT residual with the solver's own multipliers, computed here, which is the certificate where
+            contacts have several cones; where each has one, the multipliers follow from the answer.
 
     Raises:
         SolveError: the residual is above `tolerance`, or the answer is not finite.

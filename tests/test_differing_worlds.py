@@ -165,7 +165,7 @@ def test_draws_belong_to_seed_and_world() -> None:
 
 def test_what_the_controller_believes() -> None:
     case = SCENARIOS["pivot-2d"].change(
-        mass="0.8:1.4", com=(0.0, 0.02), inertia=(1.0, 2.0), mu="0.2:0.4", shove=0.2, theta_error=0.1
+        mass="0.8:1.4", com=(0.0, 0.02), inertia=(1.0, 2.0), mu="0.2:0.4", shove_bound=0.2, theta_error=0.1
     )
     begun = set_up(case, None, worlds=1, seed=0, first_world=0)
     believed, belief = begun.belief.uncertainty, begun.belief.attached.controller.belief

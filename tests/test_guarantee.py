@@ -206,7 +206,7 @@ def test_moved_cones_are_solved_alike_by_all_methods(K: int, dim: int) -> None:
 @pytest.mark.parametrize(("wrong", "message"), [
     ({"mass": (2.0, 1.0)}, "mass = (2.0, 1.0): must be (low, high) with low <= high"),
     ({"mass": (0.0, 1.0)}, "mass = (0.0, 1.0): must be an interval (low, high) of numbers > 0 [kg]"),
-    ({"inertia": (1.1, 1.2)}, "inertia = (1.1, 1.2): must be a factor on what is believed, an interval with 1 in it"),
+    ({"inertia": (0.0, 1.2)}, "inertia = (0.0, 1.2): must be an interval (low, high) of numbers > 0"),
     ({"com": (0.1, 0.2)}, "com = (0.1, 0.2): must be a number >= 0, or an interval (low, high) with 0 in it"),
     ({"com": 0.1, "dim": None}, "dim = None: must be 2 or 3, where com is one interval for all axes"),
     ({"mu": float("nan")}, "mu = nan: must be a finite number"),
@@ -222,6 +222,7 @@ def test_sets_that_no_world_is_in_are_refused(wrong: dict[str, object], message:
 @pytest.mark.parametrize(("known", "contact", "message"), [
     (Uncertainty(dim=3), Contact((-0.1, -0.1), 0.5), "uncertainty.com"),
     (Uncertainty(mass=(1.1, 1.2), dim=2), Contact((-0.1, -0.1), 0.5), "the believed mass of 1 kg is in it"),
+    (Uncertainty(inertia=(1.1, 1.2), dim=2), Contact((-0.1, -0.1), 0.5), "1, the believed inertia, is in it"),
     (Uncertainty(dim=2), Contact((-0.1, -0.1), 0.5, radius=0.01), "of contacts that roll nothing is guaranteed"),
     ("mass", Contact((-0.1, -0.1), 0.5), "uncertainty = 'mass': must be an Uncertainty"),
 ])  # fmt: skip

@@ -101,7 +101,7 @@ def test_shipped_values_are_what_they_were() -> None:
         ("seconds", "1w", "seconds = '1w': must be a number, or in natural times"),
         ("seconds", "infT", "seconds = 'infT': must be .*finite and > 0"),
         ("seconds", "1e9T", r"seconds = 1e9T, that is seconds = .*<= 3600 \[s\]"),
-        ("mass", "1w", "mass = '1w': must be a number$"),
+        ("mass", "1w", "mass = '1w': must be a number, or an interval LOW:HIGH$"),
     ],
 )
 def test_bad_text_is_named(key: str, value: str, message: str) -> None:

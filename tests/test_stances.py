@@ -160,7 +160,7 @@ def test_a_controller_that_is_given_has_the_stance_that_it_is_made_for() -> None
         ("settle-3d", {"reference": "return"}, "the reference return does not set it down and leave it there"),
         ("settle-3d", {"reference": "constant"}, "the reference constant does not set it down and leave it there"),
         ("settle-3d", {"force_rate": 50.0}, "a bound on a rate does not let the wrench change as the contacts do"),
-        ("settle-3d", {"integral": 2.0}, "landing = 'held': must be ignored with a plan or integral action"),
+        ("settle-3d", {"integral": 2.0}, "landing = 'held': must be ignored with a plan, integral action"),
         (
             "settle-3d",
             {"control": lambda now: np.zeros(6)},

@@ -47,7 +47,7 @@ def solve(
     wrench, force, message, own = route(problem, edges)
     seconds = perf_counter() - start
     return certified(
-        problem, wrench, force, message, own, method=method, seconds=seconds, tolerance=tolerance, edges=edges
+        problem, wrench, force, message, own=own, method=method, seconds=seconds, tolerance=tolerance, edges=edges
     )  # fmt: skip
 
 

@@ -25,6 +25,8 @@ def check_set(uncertainty: Uncertainty, body: Body, contacts: Sequence[Contact])
     mass = uncertainty.mass
     if mass is not None and not mass.low <= body.mass <= mass.high:
         raise fail("uncertainty.mass", mass, f"such that the believed mass of {body.mass:g} kg is in it")
+    if not uncertainty.inertia.low <= 1.0 <= uncertainty.inertia.high:
+        raise fail("uncertainty.inertia", uncertainty.inertia, "such that 1, the believed inertia, is in it")
     if any(contact.radius > 0.0 for contact in contacts):
         raise fail("uncertainty", uncertainty, "left out: of contacts that roll nothing is guaranteed")
 

@@ -104,8 +104,6 @@ class Uncertainty:
         put(self, "mass", None if mass is None else _positive("mass", mass, "kg"))
         put(self, "com", _box(com, dim))
         put(self, "inertia", _positive("inertia", inertia, ""))
-        if not self.inertia.low <= 1.0 <= self.inertia.high:
-            raise fail("inertia", inertia, "a factor on what is believed, an interval with 1 in it")
         one_of("about", about, ("com", "contact"))
         put(self, "about", about)
         put(self, "mu", None if mu is None else _positive("mu", mu, ""))

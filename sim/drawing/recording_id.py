@@ -38,8 +38,8 @@ def _add(out: Any, value: Any) -> None:
     if isinstance(value, tuple):
         for part in value:
             _add(out, part)
-    elif isinstance(value, str):
-        out.update(value.encode())
+    elif value is None or isinstance(value, str):
+        out.update(str(value).encode())
     else:
         array = np.ascontiguousarray(value)
         out.update(f"{array.dtype.str}{array.shape}".encode() + array.tobytes())
