@@ -54,5 +54,7 @@ class ClarabelWorkspace:
         answer = self._clarabel.solve()
         wrench, force = self._assembler.wrench_and_force(answer.x, self._unit)
         seconds = perf_counter() - start
-        said = answer.message, answer.residual
-        return certified(self._problem, wrench, force, *said, method="clarabel", seconds=seconds, tolerance=tolerance)
+        said, own = answer.message, answer.residual
+        return certified(
+            self._problem, wrench, force, said, own=own, method="clarabel", seconds=seconds, tolerance=tolerance
+        )  # fmt: skip
