@@ -42,6 +42,7 @@ def test_its_table_is_of_the_committed_results() -> None:
     residuals = [value for key, value in space.items() if key.endswith("contacts, space: greatest KKT residual")]
     slip, floor = (1e3 * plane[f"pivot-2d: {key}"] for key in ("slip_max_m", "slip_floor_m"))
     counts = [f"{objects[name]:.0f}" for name in ("objects", "pass", "runs", "fail", "refused")]
+    held = saved("guarantee")["figures"]
     deciding = saved("loop")["figures"]["one world: state, solve, certify, us"]
     assert plane["closed-form: failures"] == objects["wrong refusals"] == 0.0
     rows = [
@@ -51,6 +52,12 @@ def test_its_table_is_of_the_committed_results() -> None:
         f"| a block turned by 70 degrees and back | {slip:.3g} mm of slip in the worst of "
         f"{plane['pivot-2d: worlds']:.0f} worlds, of which MuJoCo's own {floor:.3g} mm |",
         f"| the same arc in 0.3 s | {1e3 * plane['snap-2d: slip_max_m']:.3g} mm |",
+        "| the block is not the one that is believed in, all {:.0f} ways | {:.3g} mm with the guarantee for a set, "
+        "{:.0f} mm without |".format(
+            held["pivot-2d: vertices"],
+            1e3 * held["pivot-2d, guarantee=set: slip_max_m"],
+            1e3 * held["pivot-2d, guarantee=none: slip_max_m"],
+        ),
         "| {} objects from published packages | {} of {} runs pass, {} fail, {} are refused, none wrongly |".format(
             *counts
         ),
