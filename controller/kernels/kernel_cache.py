@@ -27,10 +27,10 @@ def cache_folder(room: Path) -> Path | None:
 
 def drop_stale_kernels(room: Path, *others: Path) -> None:
     """Remove what was compiled of a room and its sub-rooms, if its sources or those of `others` have changed since."""
-    folders = sorted({path.parent for path in room.rglob("*.py")})
+    folders, now = sorted({path.parent for path in room.rglob("*.py")}), _digest(room, *others)
     for cache in map(cache_folder, folders):
         if cache is not None:
-            drop_stale(cache, room, *others)
+            _drop_unless(now, cache)
 
 
 def drop_stale(cache: Path, *rooms: Path) -> list[Path]:
@@ -39,11 +39,21 @@ def drop_stale(cache: Path, *rooms: Path) -> list[Path]:
     Returns what was removed. Sources are compared by their contents, because the dates of installed files need not
     increase from one version to the next.
     """
+    return _drop_unless(_digest(*rooms), cache)
+
+
+def _digest(*rooms: Path) -> str:
+    """Of all sources of these rooms."""
     digest = hashlib.sha256()
     for room in rooms:
         for source in sorted(room.rglob("*.py")):
             digest.update(str(source.relative_to(room)).encode() + b"\0" + hashlib.sha256(source.read_bytes()).digest())
-    now, kept = digest.hexdigest(), cache / "kernels.sha256"
+    return digest.hexdigest()
+
+
+def _drop_unless(now: str, cache: Path) -> list[Path]:
+    """Remove the kernels in a folder that were compiled from sources with another digest; returns what was removed."""
+    kept = cache / "kernels.sha256"
     with suppress(FileNotFoundError):
         if kept.read_text() == now:
             return []

@@ -1,10 +1,10 @@
 """`pivoting identify`: what a log of an object's motion tells of it."""
 
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 from pivoting.sim.console.stdout import JsonOutput, console, json_option
 
 
@@ -34,7 +34,7 @@ class _Interval(click.ParamType):
             low, high = (float(part) for part in parts)
         except ValueError:
             self.fail(f"{value!r}: must be LO:HI, such as 0.8:1.2", param, ctx)
-        if not (np.isfinite([low, high]).all() and low <= high):
+        if not (isfinite(low) and isfinite(high) and low <= high):
             self.fail(f"{value!r}: must be finite, with LO <= HI", param, ctx)
         return low, high
 
@@ -46,6 +46,8 @@ class _Numbers(click.ParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """(n,) of text."""
+        import numpy as np  # which a list of commands needs not
+
         try:
             found = np.array([float(part) for part in value.split(",")])
         except ValueError:
@@ -62,6 +64,8 @@ class _Box(click.ParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """(n, 2) of text."""
+        import numpy as np
+
         return np.array([_Interval().convert(part, param, ctx) for part in value.split(",")])
 
 
