@@ -8,8 +8,14 @@ that what the last one lacks is optimality, which its multipliers certify.
 
 import numpy as np
 from pivoting.controller.kernels.compilation import kernel, subroutine
-from pivoting.controller.kernels.interior_point import ITERATIONS, advance, contact_wrench, free_minimum, start
-from pivoting.controller.kernels.nesterov_todd import correct, predict
+from pivoting.controller.kernels.interior_point import (
+    ITERATIONS,
+    SHORTEST,
+    contact_wrench,
+    free_minimum,
+    improve,
+    start,
+)
 from pivoting.controller.kernels.newton_polish import gradient
 from pivoting.controller.kernels.planar_closed_form import balancing_wrench, reduce, state_from_tip
 from pivoting.controller.kernels.workspace import Q, opened
@@ -21,11 +27,11 @@ STALLED = 4  # steps without progress after which rounding has the last word
 
 
 @subroutine
-def list_cones(apex, mu, scratch):  # type: ignore[no-untyped-def]
+def list_cones(apex, highest, mu, scratch):  # type: ignore[no-untyped-def]
     """List the cones that no other one contains, the highest of each contact first, from whose apex all are counted.
 
     Args:
-        apex: (V, K, d), of which the highest of each contact, that is the first listed, is written to apex[0].
+        apex: (V, K, d).  highest: (K,) the member whose apex is the highest at each contact, which is listed first.
         scratch: of `workspace`, with room for V cones at each contact.
 
     Returns:
@@ -35,21 +41,15 @@ def list_cones(apex, mu, scratch):  # type: ignore[no-untyped-def]
     of, tip = scratch[9], scratch[6][4]
     M = K
     for k in range(K):
-        top = 0
-        for v in range(1, V):
-            if apex[v, k, dim - 1] > apex[top, k, dim - 1]:
-                top = v
-        for a in range(dim):
-            apex[0, k, a], apex[top, k, a] = apex[top, k, a], apex[0, k, a]
-        of[k] = k
+        of[k], top = k, highest[k]
         for a in range(3):
             tip[k, a] = 0.0
         first = M
-        for v in range(1, V):
-            n = apex[v, k, dim - 1] - apex[0, k, dim - 1]
-            t = apex[v, k, 0] - apex[0, k, 0]
-            o = apex[v, k, 1] - apex[0, k, 1] if dim == 3 else 0.0
-            if np.hypot(t, o) <= -mu[k] * n:  # contains the first cone
+        for v in range(V):
+            n = apex[v, k, dim - 1] - apex[top, k, dim - 1]
+            t = apex[v, k, 0] - apex[top, k, 0]
+            o = apex[v, k, 1] - apex[top, k, 1] if dim == 3 else 0.0
+            if np.hypot(t, o) <= -mu[k] * n:  # contains the first cone, or is it
                 continue
             covered = False
             i = first
@@ -76,36 +76,47 @@ def guarded_wrench(J, b, Q_w, Q_f, mu, f_min, apex, f, w, scratch, guard):  # ty
 
     Args:
         f_min: (K,) floors [N], from 0.
-        apex: (V, K, d) of all cones; the highest of each contact takes the first place.
+        apex: (V, K, d) of all cones.
         scratch: of `workspace`, for V cones at each contact.  guard: a `Guard`.
         Others: as `contact_wrench`.
     """
-    K, dim = apex.shape[1:]
-    a, left, linear, chosen = guard.tip, guard.left, guard.linear, guard.chosen
-    for k in range(K):
-        chosen[k] = 0
-        for v in range(1, apex.shape[0]):
-            if apex[v, k, dim - 1] > apex[chosen[k], k, dim - 1]:
-                chosen[k] = v
+    left, height, linear, chosen = guard.left, guard.height, guard.linear, guard.chosen
+    _choose_highest(apex, chosen)
     for _ in range(CHOICES):  # one cone at each contact often decides, and which it is shows
-        for k in range(K):
-            for i in range(dim):
-                a[dim * k + i] = apex[chosen[k], k, i]
-        state_from_tip(J, b, Q_f, f_min, guard)
-        residual = contact_wrench(J, left, Q_w, Q_f, mu, guard.height, f, w, scratch, linear)
+        _state_from_chosen(J, b, Q_f, f_min, apex, guard)
+        residual = contact_wrench(J, left, Q_w, Q_f, mu, height, f, w, scratch, linear)
         for i in range(f.shape[0]):
-            f[i] += a[i]
+            f[i] += guard.tip[i]
         if not _choose_again(apex, mu, f, chosen):
             return residual
-    cones = list_cones(apex, mu, scratch)
+    _choose_highest(apex, chosen)
+    cones = list_cones(apex, chosen, mu, scratch)
+    _state_from_chosen(J, b, Q_f, f_min, apex, guard)
+    residual = _from_tip(J, left, Q_w, Q_f, mu, height, cones, f, w, scratch, linear)
+    for i in range(f.shape[0]):
+        f[i] += guard.tip[i]
+    return residual
+
+
+@subroutine
+def _choose_highest(apex, chosen):  # type: ignore[no-untyped-def]
+    """Choose at each contact the cone with the highest apex."""
+    V, K, dim = apex.shape
+    for k in range(K):
+        chosen[k] = 0
+        for v in range(1, V):
+            if apex[v, k, dim - 1] > apex[chosen[k], k, dim - 1]:
+                chosen[k] = v
+
+
+@subroutine
+def _state_from_chosen(J, b, Q_f, f_min, apex, guard):  # type: ignore[no-untyped-def]
+    """State the problem from the apexes that are chosen."""
+    K, dim = apex.shape[1:]
     for k in range(K):
         for i in range(dim):
-            a[dim * k + i] = apex[0, k, i]
+            guard.tip[dim * k + i] = apex[guard.chosen[k], k, i]
     state_from_tip(J, b, Q_f, f_min, guard)
-    residual = _from_apex(J, left, Q_w, Q_f, mu, guard.height, cones, f, w, scratch, linear)
-    for i in range(f.shape[0]):
-        f[i] += a[i]
-    return residual
 
 
 @subroutine
@@ -125,8 +136,8 @@ def _choose_again(apex, mu, f, chosen):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def _from_apex(J, b, Q_w, Q_f, mu, f_min, cones, f, w, scratch, linear):  # type: ignore[no-untyped-def]
-    """The same, where forces and floors count from the first apex of each contact, and `cones` are listed."""
+def _from_tip(J, b, Q_w, Q_f, mu, f_min, cones, f, w, scratch, linear):  # type: ignore[no-untyped-def]
+    """The same, where forces and floors count from the highest apex of each contact, and `cones` are listed."""
     n, K = f.shape[0], mu.shape[0]
     if cones == K:
         return contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch, linear)
@@ -156,16 +167,12 @@ def _from_apex(J, b, Q_w, Q_f, mu, f_min, cones, f, w, scratch, linear):  # type
             _keep(work)
         if gap + left <= SMALLEST * size or stalled == STALLED:
             break
-        alpha = predict(mu, f_min, axes, work)
-        sigma, second = (1.0 - alpha) ** 3, alpha * alpha  # see `contact_wrench`
-        if gap + left > 0.9 * least:
-            sigma, second = max(sigma, 0.5), 0.0
-        stalled = stalled + 1 if gap + left > 0.5 * least else 0
-        least = min(least, gap + left)
-        alpha = correct(mu, f_min, axes, sigma * max(gap, left) / constraints, second, work)
-        if alpha <= 1e-12:
+        before = gap + left
+        alpha, gap, left, size = improve(mu, f_min, axes, gap, left, least, constraints, work)
+        stalled = stalled + 1 if before > 0.5 * least else 0
+        least = min(least, before)
+        if alpha <= SHORTEST:
             break
-        gap, left, size = advance(mu, f_min, axes, alpha, work)
     balancing_wrench(J, b, f, w)
     gradient(J, Q_w, Q_f, w, f, work.pull, work.z, linear)
     return _residual(J, b, Q_f, mu, f_min, f, w, linear, work)

@@ -20,6 +20,7 @@ ITERATIONS = 60  # bound; 6 to 12 are usual
 GUESSES = 3  # polishes of one iterate, each on the pieces that the one before asked for
 FIRST_GOAL = 1e-3  # relative gap at which the pieces are guessed for the first time
 SPREAD = 0.1  # least height of the start above the floors, relative to the largest force
+SHORTEST = 1e-12  # share of a step that still counts as one
 EXACT = 1e-13  # relative KKT residual at which nothing is left to improve
 
 
@@ -85,18 +86,11 @@ def contact_wrench(J, b, Q_w, Q_f, mu, f_min, f, w, scratch, linear=None):  # ty
             if best <= EXACT or goal < 1e-13:
                 break
             goal *= 1e-2
-        alpha = predict(mu, f_min, axes, work)
-        # Mehrotra's rule alone can cycle: the second-order term is only as good as the predictor is long (Colombo and
-        # Gondzio 2008), and without progress one step is taken towards the central path instead. The gap must not run
-        # ahead of the dual residual either, or the iterates end at a boundary far from the optimum.
-        sigma, second = (1.0 - alpha) ** 3, alpha * alpha
-        if gap + left > 0.9 * least:
-            sigma, second = max(sigma, 0.5), 0.0
-        least = min(least, gap + left)
-        alpha = correct(mu, f_min, axes, sigma * max(gap, left) / cones, second, work)
-        if alpha <= 1e-12:
+        before = gap + left
+        alpha, gap, left, size = improve(mu, f_min, axes, gap, left, least, cones, work)
+        least = min(least, before)
+        if alpha <= SHORTEST:
             break
-        gap, left, size = advance(mu, f_min, axes, alpha, work)
     if best > EXACT:
         best = _try(J, b, Q_w, Q_f, mu, f_min, 0, f, w, best, work, linear)
     return best if best < np.inf else np.nan
@@ -282,7 +276,28 @@ def _guess(mu, f_min, work):  # type: ignore[no-untyped-def]
 
 
 @subroutine
-def advance(mu, f_min, axes, alpha, work):  # type: ignore[no-untyped-def]
+def improve(mu, f_min, axes, gap, left, least, cones, work):  # type: ignore[no-untyped-def]
+    """Make one step, unless it is too short; returns its length, and what `_measure` does.
+
+    Args:
+        least: sum of gap and dual residual that was reached before.  cones: how many there are, floors among them.
+    """
+    alpha = predict(mu, f_min, axes, work)
+    # Mehrotra's rule alone can cycle: the second-order term is only as good as the predictor is long (Colombo and
+    # Gondzio 2008), and without progress one step is taken towards the central path instead. The gap must not run
+    # ahead of the dual residual either, or the iterates end at a boundary far from the optimum.
+    sigma, second = (1.0 - alpha) ** 3, alpha * alpha
+    if gap + left > 0.9 * least:
+        sigma, second = max(sigma, 0.5), 0.0
+    alpha = correct(mu, f_min, axes, sigma * max(gap, left) / cones, second, work)
+    if alpha <= SHORTEST:
+        return alpha, gap, left, 0.0
+    gap, left, size = _advance(mu, f_min, axes, alpha, work)
+    return alpha, gap, left, size
+
+
+@subroutine
+def _advance(mu, f_min, axes, alpha, work):  # type: ignore[no-untyped-def]
     """Follow the step: f, and the multipliers; the slacks are functions of f. Returns what `_measure` does."""
     for i in range(work.x.shape[0]):
         work.now[i] += alpha * work.x[i]
