@@ -32,7 +32,7 @@ class PivotModel:
         self.axes = np.array(
             [free_axes(belief.contacts.points, belief.contacts.pivot, belief.source.map) for belief in beliefs]
         )
-        sizes = (3, 3), (nw,), (3, nw), (3, nw), (3, 4), (3,), (3,), (4,)
+        sizes = (3, 3), (nw,), (3, nw), (3, nw), (3, 3), (3,), (3,), (3,), (4,)
         self._spin = np.zeros(6)
         self._scratch = tuple(np.zeros(size) for size in sizes)
 

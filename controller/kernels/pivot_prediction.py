@@ -1,6 +1,7 @@
 """How an object moves that turns about its believed contacts under a known wrench, and what a measured pose adds."""
 
 import numpy as np
+from pivoting.controller.kernels.cholesky import factor, solve_factored
 from pivoting.controller.kernels.compilation import kernel, subroutine
 from pivoting.controller.kernels.compiled_step import contacts_of
 from pivoting.controller.kernels.required_wrench import fill_required
@@ -22,10 +23,10 @@ def predict_worlds(beliefs, axes, wrenches, added, dt, scratch, states):  # type
         axes: (W or 1, A, 3) object axes about which the object can still turn, A <= 3; see `mobility.free_axes`.
         wrenches: (W, nw) on the object besides gravity and the contacts, object axes; what is not a number counts as 0.
         added: (W, 3) angular accelerations that the model does not know of, world axes.
-        scratch: R (3, 3), b (nw,), B and T (3, nw), G (3, 4), a (3,), still (3,) of zeros, and spin (4,).
+        scratch: R (3, 3), b (nw,), B and T (3, nw), G (3, 3), a (3,), still (3,) of zeros, rate (3,), and spin (4,).
         states: (W, 13), see `compiled_step.STATE`; written.
     """
-    R, b, B, T, G, a, still, spin = scratch
+    R, b, B, T, G, a, still, rate, spin = scratch
     (masses, inertias, gravities), all_held, (wrench_map, _), _ = beliefs
     each, A, nw = masses.shape[0], axes.shape[1], wrench_map.shape[0]
     dim = nw // 3 + 1
@@ -45,36 +46,24 @@ def predict_worlds(beliefs, axes, wrenches, added, dt, scratch, states):  # type
                 lever = component(wrench_map, row, 0.0, 0.0, 0.0, e[k, 0], e[k, 1], e[k, 2])
                 T[k, row] = B[k, row] / mass if row < dim else lever
         for k in range(A):
-            G[k, A] = 0.0
+            rate[k] = 0.0
             for row in range(nw):
                 w = wrenches[i, row] if np.isfinite(wrenches[i, row]) else 0.0
-                G[k, A] += T[k, row] * (w - b[row])
+                rate[k] += T[k, row] * (w - b[row])
             for j in range(A):
                 G[k, j] = 0.0
                 for row in range(nw):
                     G[k, j] += T[k, row] * B[j, row]
-        solve_in_place(G, A)
+        factor(G, A)
+        solve_factored(G, rate, A)
         for j in range(3):
             a[j] = 0.0
         for k in range(A):
             for j in range(3):
-                a[j] += (R[j, 0] * e[k, 0] + R[j, 1] * e[k, 1] + R[j, 2] * e[k, 2]) * G[k, A]
+                a[j] += (R[j, 0] * e[k, 0] + R[j, 1] * e[k, 1] + R[j, 2] * e[k, 2]) * rate[k]
         for j in range(3):
             omega[j] += dt * (a[j] + added[i, j])
         move_about(pivot, offset, dt, spin, states[i])
-
-
-@subroutine
-def solve_in_place(G, A):  # type: ignore[no-untyped-def]
-    """Solve G (A, A) x = G[:, A] of a positive definite matrix by elimination; the solution is written to G[:, A]."""
-    for k in range(A):
-        for row in range(A):
-            if row != k:
-                factor = G[row, k] / G[k, k]
-                for j in range(k, A + 1):
-                    G[row, j] -= factor * G[k, j]
-    for k in range(A):
-        G[k, A] /= G[k, k]
 
 
 @kernel

@@ -2,7 +2,6 @@
 
 import numpy as np
 from pivoting.controller.rotations import exponential, quaternion_product
-from pivoting.sim.pipeline.random_draws import Draws
 from pivoting.sim.pipeline.stages import ORIENTATION, POSITION, Setting, States
 
 
@@ -16,7 +15,7 @@ class OrientationBias:
     slot = "sense"
 
     def __init__(self, angle: float, setting: Setting):
-        draws = Draws(setting.seed, "bias of the orientation", setting.worlds, setting.first_world)
+        draws = setting.draws("bias of the orientation")
         self._turn = exponential(np.deg2rad(angle) * draws.direction(0, len(setting.axes)) @ setting.axes)
 
     def __call__(self, k: int, states: States) -> States:
@@ -36,7 +35,7 @@ class PositionBias:
     slot = "sense"
 
     def __init__(self, distance: float, setting: Setting):
-        draws = Draws(setting.seed, "bias of the position", setting.worlds, setting.first_world)
+        draws = setting.draws("bias of the position")
         directions = setting.directions
         self._off = distance / setting.unit * draws.direction(0, len(directions)) @ directions
 

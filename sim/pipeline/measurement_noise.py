@@ -2,7 +2,6 @@
 
 import numpy as np
 from pivoting.controller.rotations import exponential, quaternion_product
-from pivoting.sim.pipeline.random_draws import Draws
 from pivoting.sim.pipeline.stages import ORIENTATION, Setting, States
 
 
@@ -18,7 +17,7 @@ class MeasurementNoise:
 
     def __init__(self, amplitude: float, setting: Setting):
         self._amplitude = np.deg2rad(amplitude)
-        draws = Draws(setting.seed, "measured orientation", setting.worlds, setting.first_world)
+        draws = setting.draws("measured orientation")
         self._draw = draws.of(setting.case.noise_distribution)
         self._axes = setting.axes
 

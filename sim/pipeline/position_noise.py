@@ -1,6 +1,5 @@
 """Noise of the measured position, drawn anew for each world and step."""
 
-from pivoting.sim.pipeline.random_draws import Draws
 from pivoting.sim.pipeline.stages import POSITION, Setting, States
 
 
@@ -16,7 +15,7 @@ class PositionNoise:
 
     def __init__(self, amplitude: float, setting: Setting):
         self._amplitude = amplitude / setting.unit
-        draws = Draws(setting.seed, "measured position", setting.worlds, setting.first_world)
+        draws = setting.draws("measured position")
         self._draw = draws.of(setting.case.noise_distribution)
         self._directions = setting.directions
 

@@ -67,7 +67,7 @@ class Chance:
 
     def __init__(self, share: float, stream: str, setting: "Setting"):
         self._share, self._from = share, round(setting.case.fault_start / setting.dt)
-        self._draws = Draws(setting.seed, stream, setting.worlds, setting.first_world)
+        self._draws = setting.draws(stream)
         self._never = np.zeros(setting.worlds, np.bool_)
 
     def __call__(self, k: int) -> NDArray[np.bool_]:

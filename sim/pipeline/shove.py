@@ -5,7 +5,6 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 from pivoting.controller.validate import fail
 from pivoting.sim.pipeline.plan_log import Event
-from pivoting.sim.pipeline.random_draws import Draws
 from pivoting.sim.pipeline.stages import Setting
 from pivoting.sim.world import World
 
@@ -33,7 +32,7 @@ class Shove:
         room = round(case.duration / setting.dt) - self._steps - first
         if room < 0:
             raise fail("shove_seconds", case.shove_seconds, f"less than {case.duration - case.limits.settle_s:g} s")
-        draws = Draws(setting.seed, "shove", setting.worlds, setting.first_world)
+        draws = setting.draws("shove")
         self._start = first + np.floor((room + 1) * draws.shares(0)).astype(int)
         self._towards = draws.direction(1, len(setting.directions)) @ setting.directions
         self._per_kg = impulse / setting.unit / (self._steps * setting.dt)

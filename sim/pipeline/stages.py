@@ -18,6 +18,7 @@ from pivoting.controller.kernels.compiled_step import STATE
 from pivoting.controller.rotations import rotation_matrix
 from pivoting.controller.validate import fail, frozen
 from pivoting.controller.wrench_controller import WrenchController
+from pivoting.sim.pipeline.random_draws import Draws
 
 if TYPE_CHECKING:  # which are built before the stages
     from mujoco.batch import Batch
@@ -266,6 +267,10 @@ class Setting(NamedTuple):
     case: "Scenario"
     controllers: tuple[WrenchController, ...]
     unit: float
+
+    def draws(self, stream: str) -> Draws:
+        """Random numbers of the run's worlds; `stream`: what they are drawn for."""
+        return Draws(self.seed, stream, self.worlds, self.first_world)
 
     @property
     def directions(self) -> Array:
