@@ -188,9 +188,8 @@ class WrenchController:
         if self.uncertainty is None:
             raise fail("uncertainty", None, "an Uncertainty: without one there is nothing to guarantee")
         _, required, measured = self._at(state, desired)
-        _, members, excess = self._moved(measured, required)
-        one = len(self.contacts) == 1
-        return Guarantee("strong" if one else "weak", float(excess), members == 1 or excess == 0.0)
+        *_, excess = self._moved(measured, required)
+        return Guarantee("strong" if len(self.contacts) == 1 else "weak", float(excess), proved=len(self.Q_f) == 2)
 
     def _at(self, state: Motion, desired: Motion | None) -> tuple[Array, Array, tuple[Array, ...]]:
         """J, the required wrench, and orientation and angular velocity (world axes) as they are measured."""
@@ -202,7 +201,8 @@ class WrenchController:
         """The cones that the members ask for, how many members there are, and the excess [N]."""
         scratch = guard(len(required), len(self.contacts), self.space.dim)
         seen = [np.array(values) for values in measured]
-        return scratch, *state_cones(self.belief, *seen, np.empty((3, 3)), required, scratch)
+        planar = True if len(self.Q_f) == 2 else None
+        return scratch, *state_cones(self.belief, *seen, np.empty((3, 3)), required, scratch, planar)
 
     def _stated(self, measured: tuple[Array, ...], desired: tuple[Array, ...]) -> tuple[Array, Array]:
         """J (nw, K d) and the required wrench (nw,) at q, omega for q_d, omega_d, alpha_d, all in world axes."""

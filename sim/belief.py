@@ -13,9 +13,9 @@ from pivoting.models.friction_coefficient import read_friction
 from pivoting.models.names import body_id, geom_id
 from pivoting.models.scenes import Scene
 from pivoting.sim.attachment import Attached, attach
-from pivoting.sim.believed_set import believed_set, refuse_across_the_plane
 from pivoting.sim.pace import closing_force
 from pivoting.sim.placement import Placement, placed
+from pivoting.sim.scenario_uncertainty import refuse_across_the_plane, scenario_uncertainty
 from pivoting.sim.scenarios.intervals import middle
 from pivoting.sim.scenarios.scenario import PACE, Scenario
 from pivoting.sim.scenarios.scenario_keys import CONTROL_KEYS, LOWEST
@@ -68,7 +68,7 @@ def believe(case: Scenario, read: Scene, worlds: int = 1, given: Controllers = N
     case = replace(case, body=scene.body, support=scene.support)
     there = placed(case, scene.compiled, read.unit)
     refuse_across_the_plane(case, there.body)
-    believed = believed_set(case, there.body, read.unit)
+    believed = scenario_uncertainty(case, there.body, read.unit)
     if case.chosen and case.mu is None:  # what the file itself says of friction holds: it may have none
         read_friction(read.read, body_id(read.read, read.body), geom_id(read.read, read.support), there.contacts)
     controllers = _given(given, worlds)

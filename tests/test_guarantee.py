@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 from tests.draws import draw, stated
 
 GRAVITY = 9.81
-SETS = int(os.environ.get("PIVOTING_SETS", "2"))  # of each kind; `make evidence` asks for 500
+SETS = int(os.environ.get("PIVOTING_SETS", "2"))  # of each kind; `make guarantee` tries 500
 LARGE = {"shove": 0.2, "theta": np.deg2rad(0.1), "omega": 0.1}
 
 
@@ -72,7 +72,7 @@ def test_no_member_in_the_plane_violates_a_cone(about: str) -> None:
     for _ in range(SETS):
         controller, state, desired = planar(rng, about)
         answer = solve(controller.problem(state, desired))
-        slack = worst_case(controller, state, answer.wrench).slack / load(controller)
+        slack = worst_case(controller, state, answer.wrench, thorough=True).slack / load(controller)
         assert slack >= -1e-9
         binding += slack < 1e-7
     assert about == "com" or binding >= SETS // 5

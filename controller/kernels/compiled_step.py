@@ -40,21 +40,19 @@ def state_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ig
 
 
 @kernel
-def state_cones(belief, q, omega, R, b, guard):  # type: ignore[no-untyped-def]
-    """Write where all members of the believed set ask the cones to be, into a `Guard`.
+def state_cones(belief, q, omega, R, b, guard, planar):  # type: ignore[no-untyped-def]
+    """Write the apexes and floors that all members of the believed set ask for, into a `Guard`.
 
     Args:
         belief: the values of a `Belief`, with a set.  b: (nw,) the required wrench.  R: (3, 3) scratch.
+        planar: True for one contact in the plane, else None, so that the compiler leaves out what is not needed.
+
+    Returns:
+        How many members there are, and what had to be added [N].
     """
     moved, held, (wrench_map, _), _, unknown = belief
     fill_rotation(q, R)
-    return guard_state(R, omega, b, moved, held, wrench_map, unknown, guard)
-
-
-@subroutine
-def guard_state(R, omega, b, moved, held, wrench_map, unknown, guard):  # type: ignore[no-untyped-def]
-    """Write the apexes and floors that all members ask for; returns how many members, and what had to be added [N]."""
-    if held.Q_f.shape[0] == 2:
+    if planar is not None:
         return 1, move_planar_cone(R, omega, b, moved, held, wrench_map, unknown, guard)
     return move_cones(R, omega, b, moved, held, wrench_map, unknown, guard)
 

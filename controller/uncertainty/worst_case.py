@@ -1,4 +1,4 @@
-"""The worst member of a set for one wrench, searched for: rigid-body equations, and a global method from SciPy.
+"""The worst member of a set for one wrench, searched for: rigid-body equations, and the searches of SciPy.
 
 It shares no formula with the guarantee, which it is there to attack.
 """
@@ -91,11 +91,11 @@ def contact_forces(controller: WrenchController, state: Motion, wrench: ArrayLik
 def worst_case(
     controller: WrenchController, state: Motion, wrench: ArrayLike, *, thorough: bool = False, seed: int = 0
 ) -> WorstCase:
-    """The worst world of a controller's set for one wrench.
+    """The worst world of a controller's set for one wrench, by local searches from vertices and random members.
 
     Args:
         state: as it is measured.  wrench: (nw,) object axes, such as that of the `Solution`.
-        thorough: search by differential evolution in addition to local searches from vertices and random members.
+        thorough: search globally as well, by differential evolution.
 
     Raises:
         ValueError: the controller has no set; or it has more contacts than two, whose squeezes are not searched.
