@@ -23,8 +23,6 @@ def scenario_uncertainty(case: Scenario, body: RigidBody, unit: float = 1.0) -> 
     intervals = {key: _interval(value) for key, value in told.items()}
     mass = intervals["mass"] if isinstance(told.get("mass"), Interval) else body.mass
     inertia, mu = intervals.get("inertia"), told.get("mu")
-    if inertia is None and isinstance(mass, Interval):
-        inertia = mass  # to which it is then in proportion
     axes = COM_KEYS[::2] if body.dim == 2 else COM_KEYS
     offsets = [intervals.get(axis, Interval(0.0, 0.0)) for axis in axes]
     return Uncertainty(

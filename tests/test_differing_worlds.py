@@ -189,6 +189,9 @@ def test_a_world_of_the_set_has_the_inertia_that_is_believed_whatever_its_mass()
     member = simulate("balance-2d", seconds=0.6, mass=(0.8, 1.2), **{"world.mass": 1.2})
     drawn = simulate("balance-2d", 2, seconds=0.6, mass=(0.8, 1.2))
     hidden = simulate("balance-2d", 2, seconds=0.6, **{"world.mass": (0.8, 1.2)})
+    known = drawn.attached.controller.uncertainty
+    assert known is not None
+    assert known.inertia == (1.0, 1.0)  # and so the controller is told
     assert plain.truth.inertia == pytest.approx(0.2)
     assert member.truth.inertia == pytest.approx(1.0 / 6.0)
     assert plain.truth.mass == member.truth.mass == pytest.approx(1.2)
