@@ -1,6 +1,7 @@
 """What makes compiling slow is not written: see `pivoting.controller.kernels.compilation`."""
 
 import ast
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -79,3 +80,33 @@ def test_one_compiled_loop_serves_a_scenario_and_an_object_of_ones_own(tmp_path:
         [sys.executable, "-c", LOOPS.format(path=str(path))], capture_output=True, text=True, check=True
     )
     assert done.stdout.split() == ["1"]
+
+
+BESIDE = """
+import sys
+import numpy as np
+from pivoting.controller.kernels.second_compiler import compiled_beside
+from pivoting.controller.rotations import fill_rotation
+sys.executable = {executable!r}
+q, R = np.array([1.0, 0.0, 0.0, 0.0]), np.empty((3, 3))
+with compiled_beside(fill_rotation, q, R):
+    pass
+fill_rotation(q, R)
+print(sum(fill_rotation.stats.cache_hits.values()), sum(fill_rotation.stats.cache_misses.values()), np.trace(R))
+"""
+
+
+@pytest.mark.parametrize(
+    ("executable", "told"),
+    [(sys.executable, "1 0 3.0"), (f"{sys.executable}-missing", "0 1 3.0"), ("/bin/false", "0 1 3.0")],
+)
+def test_what_a_second_process_has_compiled_is_taken_from_the_cache(tmp_path: Path, executable: str, told: str) -> None:
+    """And where there is no second process it is compiled here."""
+    done = subprocess.run(
+        [sys.executable, "-c", BESIDE.format(executable=executable)],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)},
+    )
+    assert done.stdout.strip() == told

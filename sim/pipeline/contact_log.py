@@ -1,6 +1,7 @@
 """The contacts of every step, sorted a few steps at once: all that MuJoCo lists of them would fill the memory."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,11 +48,14 @@ class ContactLog:
         B is at most `most`.
         """
         steps = len(sensed)
+        sort_contacts(*self.arguments(poses, sensed))
+        for kept, values in zip(self._kept, self._block, strict=True):
+            kept[first : first + steps] = values[:steps]
+
+    def arguments(self, poses: Array, sensed: Array) -> tuple[Any, ...]:
+        """Those of `sort_contacts`."""
         contacts, touching, declared, rows, *scratch = self._with
-        block = [values[:steps] for values in self._block]
-        sort_contacts(
-            sensed, contacts, touching, np.ascontiguousarray(poses), declared, rows, *scratch,
-            tuple(block[:READINGS]), tuple(block[READINGS:]),
-        )  # fmt: skip
-        for kept, values in zip(self._kept, block, strict=True):
-            kept[first : first + steps] = values
+        block = [values[: len(sensed)] for values in self._block]
+        poses = np.ascontiguousarray(poses)
+        held = tuple(block[READINGS:])
+        return sensed, contacts, touching, poses, declared, rows, *scratch, tuple(block[:READINGS]), held

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.kernels.compilation import first_calls
 from pivoting.controller.kernels.compiled_step import STATE
+from pivoting.controller.kernels.second_compiler import compiled_beside
 from pivoting.controller.validate import fail
+from pivoting.sim.contact_sensing import sort_contacts
 from pivoting.sim.pipeline.apply_wrench import FreeWrench
 from pivoting.sim.pipeline.contact_log import ContactLog
 from pivoting.sim.pipeline.log import Log
@@ -49,15 +51,16 @@ class Steps:
     def prepare(self) -> None:
         """Compile all that a step calls, so that no step waits for it."""
         log, states = self.log, self._plant.states
-        nw = log.answers.nw
+        nw, nothing = log.answers.nw, (log.states[:0], self._block[:0])
         with first_calls():
-            first_answers = Answers(log.answers.values[0], log.answers.status[0], nw)
-            self._control.prepare(states, first_answers)
-            for prepare in (getattr(stage, "prepare", None) for stage in chain(*self._stages)):
-                if prepare is not None:
-                    prepare()
-            self._apply(states, first_answers.values, nw, log.wrench_world[0])
-            self._contacts.sort(0, log.states[:0], self._block[:0])
+            with compiled_beside(sort_contacts, *self._contacts.arguments(*nothing)):
+                first_answers = Answers(log.answers.values[0], log.answers.status[0], nw)
+                self._control.prepare(states, first_answers)
+                for prepare in (getattr(stage, "prepare", None) for stage in chain(*self._stages)):
+                    if prepare is not None:
+                        prepare()
+                self._apply(states, first_answers.values, nw, log.wrench_world[0])
+            self._contacts.sort(0, *nothing)
 
     def make(self, last: int, progress: Callable[[int, int], None] | None = None) -> None:
         """Make the steps up to number `last`.
