@@ -51,7 +51,7 @@ def _second_compiler() -> "subprocess.Popen[bytes] | None":
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-            start_new_session=True,  # Ctrl-C is for this one to hear
+            process_group=0,  # Ctrl-C is for this one to hear
         )
     except OSError:  # as where no more processes or no more memory are allowed
         return None
