@@ -9,7 +9,7 @@ TESTS := -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 UV := .venv-lock/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
 	--custom-compile-command "make lock"
 
-.PHONY: help demo test check docs latest bench evidence kills guarantee learning study engines objects figures lock clean
+.PHONY: help demo test check docs latest bench evidence kills guarantee sweeps learning study engines objects figures lock clean
 
 demo: $(STAMP)  ## the worked example, a block pivoted in MuJoCo, its verdict, a recording and a picture in out/
 	@mkdir -p out
@@ -48,6 +48,9 @@ evidence: $(STAMP)  ## random problems by the hundred thousand, 256 worlds of ev
 
 guarantee: $(STAMP)  ## random sets against a search for their worst members, vertices in MuJoCo, what a guarantee costs
 	$(BIN)/python benchmarks/evidence_guarantee.py --json benchmarks/results/guarantee.json
+
+sweeps: $(STAMP)  ## ten thousand worlds in which everything is wrong at once, with a guarantee, without, and with a constant floor
+	$(BIN)/python benchmarks/evidence_sweep.py --json benchmarks/results/sweep.json
 
 learning: $(STAMP)  ## what a thousand objects reveal in one pivot each, and whether the set holds the truth
 	$(BIN)/python benchmarks/evidence_learning.py --json benchmarks/results/learning.json
