@@ -1,6 +1,6 @@
 """The picture of what a guarantee costs: price against the size of the set, for some angles and friction coefficients.
 
-Called with the picture's file. The object is that of pivot-2d, at rest, with the scenario's law and reserve of friction.
+Called with the picture's file. The object is that of pivot-2d, at rest, with the scenario's reserve of friction.
 """
 
 import sys

@@ -14,7 +14,7 @@ import pytest
 from pivoting.controller import Body, Contact, Law, Margins, WrenchController, price, solve
 from pivoting.controller.motion import Motion
 from pivoting.controller.rotations import rotation_matrix
-from pivoting.controller.uncertainty.grip import Beliefs, Grip
+from pivoting.controller.uncertainty.grip import Beliefs, GivenWrench
 from pivoting.controller.uncertainty.uncertainty import Interval, Member, Uncertainty
 from pivoting.controller.uncertainty.worst_case import PossibleWorld, contact_forces, worst_case
 from pivoting.controller.validate import Array
@@ -66,7 +66,7 @@ def test_the_force_of_a_member_is_that_of_its_equations_of_motion(kind: str) -> 
         known, grip_state = controller.uncertainty, controller.space.lift_motion(state)[:2]
         assert known is not None
         wrench = some_wrench(rng, controller, state, wanted) + load(controller) * rng.normal(size=controller.widths[0])
-        beliefs, grip = Beliefs(controller), Grip(controller, *grip_state, wrench)
+        beliefs, grip = Beliefs(controller), GivenWrench(controller, *grip_state, wrench)
         member = known.at(rng.random(known.unknowns))
         alone = beliefs.member._replace(
             mass=np.full(2, member.mass),

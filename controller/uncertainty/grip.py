@@ -93,7 +93,7 @@ class Beliefs:
         return belief._replace(unknown=self.member._replace(push=belief.unknown.push))
 
 
-class Grip:
+class GivenWrench:
     """The contacts of an object at one state under one wrench.
 
     Args:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pivoting.controller.belief import BelievedSet
 from pivoting.controller.rotations import rotation_matrix
 from pivoting.controller.uncertainty.first_loss import first_loss, last_held
-from pivoting.controller.uncertainty.grip import HELD, Beliefs, Grip
+from pivoting.controller.uncertainty.grip import HELD, Beliefs, GivenWrench
 from pivoting.controller.uncertainty.uncertainty import Interval
 from pivoting.controller.validate import Array, InputError
 
@@ -95,14 +95,14 @@ class Margins:
 
 def margins(controller: "WrenchController", orientation: Array, omega: Array, wrench: ArrayLike) -> Margins:
     """See `WrenchController.margins`; the state is (4,) and (3,), as `Space.lift_motion` gives it."""
-    beliefs, grip = Beliefs(controller), Grip(controller, orientation, omega, wrench)
+    beliefs, grip = Beliefs(controller), GivenWrench(controller, orientation, omega, wrench)
     slack, share = slack_and_share(beliefs, grip)
     scale = np.nan if controller.uncertainty is None else wrench_scale(beliefs, grip)
     alone, stability = _Alone(beliefs, grip), _stability(beliefs, grip, rotation_matrix(orientation))
     return Margins(slack, share, scale, _friction(beliefs, grip), *alone.intervals(), stability)
 
 
-def slack_and_share(beliefs: Beliefs, grip: Grip) -> tuple[float, float]:
+def slack_and_share(beliefs: Beliefs, grip: GivenWrench) -> tuple[float, float]:
     """`Margins.slack` and `Margins.share`."""
     slack = grip.slack(beliefs.whole)
     return slack, share_of(slack, grip.normal(beliefs.believed))
@@ -113,7 +113,7 @@ def share_of(slack: float, normal: float) -> float:
     return slack / normal if normal > 0.0 else -np.inf
 
 
-def wrench_scale(beliefs: Beliefs, grip: Grip, near: float = 1.0) -> float:
+def wrench_scale(beliefs: Beliefs, grip: GivenWrench, near: float = 1.0) -> float:
     """`Margins.wrench_scale`, searched for from `near` on."""
 
     def slack(scale: float) -> float:
@@ -138,7 +138,7 @@ def _allowed(beliefs: Beliefs) -> float:
     return HELD * beliefs.controller.units.force
 
 
-def _friction(beliefs: Beliefs, grip: Grip) -> float:
+def _friction(beliefs: Beliefs, grip: GivenWrench) -> float:
     """`Margins.friction`."""
 
     def slack(factor: float) -> float:
@@ -154,7 +154,7 @@ def _friction(beliefs: Beliefs, grip: Grip) -> float:
 class _Alone:
     """How far each unknown alone may move."""
 
-    def __init__(self, beliefs: Beliefs, grip: Grip):
+    def __init__(self, beliefs: Beliefs, grip: GivenWrench):
         self._beliefs, self._grip, self._allowed = beliefs, grip, _allowed(beliefs)
         units = beliefs.controller.units
         self._reach, pull = units.length, units.force / beliefs.controller.body.mass
@@ -225,7 +225,7 @@ class _Alone:
             return -np.inf
 
 
-def _stability(beliefs: Beliefs, grip: Grip, R: Array) -> FrictionalStability:
+def _stability(beliefs: Beliefs, grip: GivenWrench, R: Array) -> FrictionalStability:
     """The margins of `FrictionalStability`."""
     controller, belief = beliefs.controller, beliefs.of_member(beliefs.member)
     held, allowed, gravity = belief.contacts, _allowed(beliefs), belief.object.gravity

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pivoting.controller.uncertainty.grip import Beliefs, Grip
+from pivoting.controller.uncertainty.grip import Beliefs, GivenWrench
 from pivoting.controller.uncertainty.margins import slack_and_share, wrench_scale
 from pivoting.controller.uncertainty.price import nominal, wrench_size
 from pivoting.controller.validate import frozen
@@ -87,7 +87,7 @@ def _margins(controller: WrenchController, states: Array, wrenches: Array) -> Ar
     """(3, M) slack, share and scale; the search for a scale begins at that of the step before."""
     beliefs, found, near = Beliefs(controller), np.empty((3, len(states))), 1.0
     for i, (state, wrench) in enumerate(zip(states, wrenches, strict=True)):
-        grip = Grip(controller, state[ORIENTATION], state[ANGULAR_VELOCITY], wrench)
+        grip = GivenWrench(controller, state[ORIENTATION], state[ANGULAR_VELOCITY], wrench)
         found[:2, i] = slack_and_share(beliefs, grip)
         found[2, i] = scale = wrench_scale(beliefs, grip, near)
         near = scale if 0.0 < scale < np.inf else near
