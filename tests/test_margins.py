@@ -127,7 +127,7 @@ def _with(controller: WrenchController, known: Uncertainty) -> WrenchController:
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_wrench_for_the_set_has_a_scale_of_one_at_least(kind: str) -> None:
     rng, binding = np.random.default_rng(30 + len(kind)), 0
-    for _ in range(4 * CASES):
+    for _ in range((1 if kind == "edge" else 4) * CASES):
         controller, state, wanted = KINDS[kind](rng)
         answer = solve(controller.problem(state, wanted))
         found = controller.margins(state, answer)

@@ -14,13 +14,13 @@ from rich.console import Console
 from tests.recordings import one_each, read, steps
 
 TOLD = {"mass": (0.8, 1.2), "com": (-0.05, 0.05), "inertia": (0.8, 1.2), "mu": 0.25}
-LOOP = {"seconds": 0.5, "hold": 0.05, "theta_end": 40.0}
+LOOP = {"seconds": 0.4, "hold": 0.05, "theta_end": 30.0}
 
 
 @pytest.fixture(scope="module")
 def run() -> Run:
     """With noise and an actuator that does not give all of the wrench: what the margins count is what was logged."""
-    return simulate("pivot-2d", 2, **TOLD, **LOOP, noise=0.05, actuator_force=8.0)
+    return simulate("pivot-2d", 2, **TOLD, **LOOP, noise=0.05, actuator_force=4.0)
 
 
 def test_they_are_those_of_the_controller_at_what_was_logged(run: Run) -> None:
@@ -28,10 +28,11 @@ def test_they_are_those_of_the_controller_at_what_was_logged(run: Run) -> None:
     assert found is not None
     assert run.log.measured is not None
     assert run.log.acting is not None
-    assert 250 < found.steps.size <= 501
+    assert 200 < found.steps.size <= 501
     assert found.steps[-1] == run.status.shape[1] - 1
+    assert found.slack.min() < -0.01  # what the actuator does not give
     world, here = run.worst_world, controller.space
-    for i in (0, 100, found.steps.size - 1):
+    for i in (0, 100, int(found.slack.argmin()), found.steps.size - 1):
         k = found.steps[i]
         q, omega = run.log.measured[world, k, 3:7], run.log.measured[world, k, 10:13]
         state = Motion(float(here.angle(q)), float(omega @ here.axial(1.0)))
