@@ -31,6 +31,11 @@ KINDS: dict[str, Callable[[np.random.Generator], tuple[WrenchController, Motion,
 }
 
 
+def cases(kind: str) -> int:
+    """Fewer where the best squeeze of every member is searched for."""
+    return max(1, CASES // 2) if kind == "edge" else CASES
+
+
 def load(controller: WrenchController) -> float:
     return GRAVITY * controller.body.mass
 
@@ -85,7 +90,7 @@ def test_the_force_of_a_member_is_that_of_its_equations_of_motion(kind: str) -> 
 def test_slack_is_that_of_the_worst_member(kind: str) -> None:
     """Not more than a search finds; as much, in the plane about the contact, where the guarantee is exact."""
     rng = np.random.default_rng(10 + len(kind))
-    for _ in range(CASES):
+    for _ in range(cases(kind)):
         controller, state, wanted = KINDS[kind](rng)
         wrench = some_wrench(rng, controller, state, wanted)
         found = worst_case(controller, state, wrench).slack
@@ -97,7 +102,7 @@ def test_slack_is_that_of_the_worst_member(kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_scale_of_a_wrench_is_where_the_first_member_is_lost(kind: str) -> None:
     rng, between = np.random.default_rng(20 + len(kind)), 0
-    for _ in range(CASES):
+    for _ in range(cases(kind)):
         controller, state, wanted = KINDS[kind](rng)
         wrench = some_wrench(rng, controller, state, wanted)
         scale, known = controller.margins(state, wrench).wrench_scale, controller.uncertainty
@@ -112,7 +117,7 @@ def test_the_scale_of_a_wrench_is_where_the_first_member_is_lost(kind: str) -> N
                 assert slack >= -1e-9 * load(controller)
             elif kind == "plane, contact":
                 assert slack < 0.0
-    assert between >= CASES // 2
+    assert between >= cases(kind) // 2
 
 
 def _with(controller: WrenchController, known: Uncertainty) -> WrenchController:
@@ -127,7 +132,7 @@ def _with(controller: WrenchController, known: Uncertainty) -> WrenchController:
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_wrench_for_the_set_has_a_scale_of_one_at_least(kind: str) -> None:
     rng, binding = np.random.default_rng(30 + len(kind)), 0
-    for _ in range((1 if kind == "edge" else 4) * CASES):
+    for _ in range(4 * cases(kind)):
         controller, state, wanted = KINDS[kind](rng)
         answer = solve(controller.problem(state, wanted))
         found = controller.margins(state, answer)

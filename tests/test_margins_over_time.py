@@ -56,8 +56,8 @@ def test_the_summary_has_the_least_of_them(run: Run) -> None:
     console = Console(file=io.StringIO(), width=400)
     print_run(console, run)
     told = console.file.getvalue()  # type: ignore[attr-defined]
-    assert f"slack of the worst member {found.slack.min():.3g} N at least" in told
-    assert f"its wrench holds {found.wrench_scale.min():.3g} times the set at least" in told
+    assert f"worst member: slack {found.slack.min():.3g} N at least" in told
+    assert f"at a scale of {found.wrench_scale.min():.3g} at least" in told
 
 
 def test_the_recording_has_them(run: Run, tmp_path: Path) -> None:

@@ -108,12 +108,12 @@ def _print_margins(console: Console, summary: Mapping[str, Any]) -> None:
     """How well the wrenches of the worst world held the set of its controller, where it has one."""
     if "slack_min_N" not in summary:
         return
-    share, scale = summary["share_min"], summary["wrench_scale_min"]
+    slack, share = (round(value, 9) + 0.0 for value in (summary["slack_min_N"], 100.0 * summary["share_min"]))
     console.print(
-        f"grip for the set: slack of the worst member {_short(summary['slack_min_N'])} N at least,"
-        f" {_short(100.0 * share)} % of f_n; its wrench holds {scale:.3g} times the set at least;"
-        f" price, median: {_short(summary['price_median'])} times the wrench,"
-        f" {_short(summary['price_objective_median'])} times the objective",
+        f"grip of the set's worst member: slack {_short(slack)} N at least, {_short(share)} % of f_n;"
+        f" the wrench holds the set at a scale of {summary['wrench_scale_min']:.3g} at least;"
+        f" price, median: {_short(summary['price_objective_median'])} times the objective,"
+        f" {_short(summary['price_median'])} times the wrench",
         soft_wrap=True,
         highlight=False,
     )
