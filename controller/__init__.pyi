@@ -30,6 +30,8 @@ from .wrench_bounds import WrenchBounds as WrenchBounds
 from .wrench_controller import WrenchController as WrenchController
 from .wrench_problem import WrenchProblem as WrenchProblem, wrench_weight as wrench_weight
 from .uncertainty.guarantee import Guarantee as Guarantee
+from .uncertainty.margins import FrictionalStability as FrictionalStability, Margins as Margins
+from .uncertainty.price import Price as Price, price as price
 from .uncertainty.uncertainty import Interval as Interval, Member as Member, Uncertainty as Uncertainty
 from .uncertainty.slack_bounds import SlackBounds as SlackBounds, slack_bounds as slack_bounds
 from .uncertainty.worst_case import PossibleWorld as PossibleWorld, WorstCase as WorstCase, worst_case as worst_case

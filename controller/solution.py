@@ -47,6 +47,24 @@ class Solution:
         """The cost 1/2 w'Q_w w + 1/2 f'Q_f f, as the notes define it (the number that they print is twice this)."""
         return self.problem.objective(self.wrench, self.force)
 
+    @property
+    def slack(self) -> float:
+        """The least of f_n - |f_t| / mu and f_n - f_min over all contacts and all their cones [N].
+
+        Each cone counts from its apex, with the mu that the answer may use; so where the problem is that of an
+        uncertain object, this is the slack of the worst member, as the guarantee counts it, of two contacts with the
+        squeeze of this answer. `WrenchController.margins` tells more, and of any wrench.
+        """
+        moved, problem = self.force - self.problem.apex, self.problem
+        above = moved[..., -1] - np.linalg.norm(moved[..., :-1], axis=-1) / problem.mu_planned
+        return float(min(above.min(), (self.force[:, -1] - problem.f_min).min()))
+
+    @property
+    def share(self) -> float:
+        """The slack over the mean normal force; -inf if that is not above 0."""
+        normal = float(self.force[:, -1].mean())
+        return self.slack / normal if normal > 0.0 else -np.inf
+
 
 def certified(
     problem: WrenchProblem,

@@ -19,8 +19,10 @@ from pivoting.controller.kernels.workspace import MEMBERS, Guard, guard, several
 from pivoting.controller.motion import Motion
 from pivoting.controller.plane_and_space import Space, space
 from pivoting.controller.rotations import IDENTITY, rotation_matrix
+from pivoting.controller.solution import Solution
 from pivoting.controller.uncertainty.believed_set import believed_set, check_set, guarded_cones
 from pivoting.controller.uncertainty.guarantee import Guarantee
+from pivoting.controller.uncertainty.margins import Margins, margins
 from pivoting.controller.uncertainty.uncertainty import Uncertainty
 from pivoting.controller.units import Units, lever, units
 from pivoting.controller.validate import Array, array, fail, number, positive_definite
@@ -190,6 +192,25 @@ class WrenchController:
         _, required, measured = self._at(state, desired)
         *_, excess = self._moved(measured, required)
         return Guarantee("strong" if len(self.contacts) == 1 else "weak", float(excess), proved=len(self.Q_f) == 2)
+
+    def margins(self, state: Motion, wrench: ArrayLike | Solution, *, external: ArrayLike | None = None) -> Margins:
+        """By how much a wrench holds the contacts in the worlds of the controller's set, or in what it believes.
+
+        Whatever law, bounds or actuators the wrench comes from, the contact forces follow from it and from the state;
+        a reference is not needed.
+
+        Args:
+            state: the measured state; its acceleration is not used.
+            wrench: (nw,) as it is applied, object axes [N, N m], or the `Solution` that has it.
+            external: (nw,) known wrench on the object besides, as for `problem`.
+
+        Raises:
+            ValueError: there are more than two contacts, or one that rolls.
+        """
+        applied = array("wrench", wrench.wrench if isinstance(wrench, Solution) else wrench, (len(self.Q_w),))
+        if external is not None:
+            applied = applied + array("external", external, applied.shape)
+        return margins(self, *self.space.lift_motion(state)[:2], applied)
 
     def _at(self, state: Motion, desired: Motion | None) -> tuple[Array, Array, tuple[Array, ...]]:
         """J, the required wrench, and orientation and angular velocity (world axes) as they are measured."""

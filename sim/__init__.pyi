@@ -4,6 +4,7 @@ from .fleet import Fleet as Fleet, ReplayError as ReplayError, WorldSamples as W
 from .judging.assertions import assert_sticking as assert_sticking, assert_tracking as assert_tracking
 from .judging.verdict import Check as Check, Limits as Limits
 from .run import Run as Run
+from .judging.margins_over_time import MarginsOverTime as MarginsOverTime
 from .saved_run import load as load
 from .scenarios.scenario import Scenario as Scenario
 from .scenarios.shipped_scenarios import SCENARIOS as SCENARIOS, own_object as own_object, scenario as scenario

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pivoting.controller.rotations import angle_between
 from pivoting.controller.validate import frozen
 from pivoting.sim.judging.findings import Findings, find
+from pivoting.sim.judging.margins_over_time import MarginsOverTime, margins_over_time
 from pivoting.sim.judging.measures import Measures, measure
 from pivoting.sim.judging.undeclared_contacts import stray_words
 from pivoting.sim.slip import ContactMotion
@@ -44,7 +45,13 @@ class Run(ContactMotion):
     def summary(self) -> dict[str, Any]:
         """The run in numbers, of the worst world, SI units in the keys; what `--json` prints."""
         played = {} if self.plan is None else {"plan_angle_error_max_deg": float(np.rad2deg(self.plan_error.max()))}
-        return {**super().summary(), **played}
+        margins = {} if self.margins is None else self.margins.figures()
+        return {**super().summary(), **played, **margins}
+
+    @cached_property
+    def margins(self) -> MarginsOverTime | None:
+        """Of the worst world over time: how well its wrenches held the set of its controller; None without a set."""
+        return margins_over_time(self, self.worst_world)
 
     def to_dataframe(self) -> "pandas.DataFrame":
         """What people plot of it, as a table; see `data_frame`.

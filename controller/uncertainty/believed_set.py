@@ -38,6 +38,15 @@ def believed_set(
 
     Args:
         gravity: (3,) world axes.  points: (K, 3) contacts from the believed CoM.  pivot: (3,) their mean; object axes.
+    """
+    axes = np.ascontiguousarray(free_axes(points, pivot, space.wrench_map))
+    return set_about(uncertainty, body, gravity, space, axes, _spread(points))
+
+
+def set_about(
+    uncertainty: Uncertainty, body: Body, gravity: Array, space: Space, axes: Array, spread: Array
+) -> BelievedSet:
+    """The same for contacts whose `axes` and `spread`, see `BelievedSet`, are known already.
 
     An error of the measured orientation tilts gravity against what is believed, like a push, and the contact's axes.
     """
@@ -51,8 +60,8 @@ def believed_set(
         about_contact=uncertainty.about == "contact",
         push=shove + 2.0 * float(np.linalg.norm(gravity)) * np.sin(0.5 * tilt),
         spin=greatest(uncertainty.omega),
-        axes=np.ascontiguousarray(free_axes(points, pivot, space.wrench_map)),
-        spread=_spread(points),
+        axes=axes,
+        spread=spread,
     )
 
 

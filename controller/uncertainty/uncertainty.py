@@ -1,6 +1,7 @@
 """The set in which the world is: honest bounds on what the controller does not know."""
 
-from dataclasses import dataclass, fields, replace
+from copy import copy
+from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple, Self
 
@@ -9,6 +10,7 @@ from numpy.typing import ArrayLike
 from pivoting.controller.validate import Array, array, fail, frozen, number, one_of
 
 SHOVE_SECONDS = 0.05  # over which a shove is spread, unless it is said otherwise [s]
+DISTURBANCES = ("shove", "theta", "omega")  # intervals about 0
 
 
 class Interval(NamedTuple):
@@ -144,21 +146,36 @@ class Uncertainty:
         return [self.at(ends) for ends in product(*((0.0, 1.0) if width > 0.0 else (0.0,) for width in widths))]
 
     def scaled(self, scale: float) -> Self:
-        """The set about the same nominal member, `scale` times as wide in every direction, as far as worlds exist.
+        """The set about the same nominal member, `scale` times as wide in every direction.
+
+        What is believed may be outside of it where it is not in the middle: the nominal member is.
 
         Args:
-            scale: >= 0; 0 leaves the nominal member alone.
+            scale: >= 0, and < `widest`; 0 leaves the nominal member alone, which no disturbance meets.
+
+        Raises:
+            ValueError: the scale is not in this range.
         """
-        factor = number("scale", scale, at_least=0.0)
-        changed = {
-            each.name: getattr(self, each.name).scaled(factor)
-            for each in fields(self)
-            if isinstance(getattr(self, each.name), Interval)
-        }
-        changed["inertia"] = Interval(*(1.0 + factor * (end - 1.0) for end in self.inertia))
+        factor = number("scale", scale, at_least=0.0, below=self.widest)
         middle, half = self.com.mean(axis=1), 0.5 * np.ptp(self.com, axis=1)
-        com = np.column_stack([middle - factor * half, middle + factor * half])
-        return replace(self, **changed, com=com)
+        changed: dict[str, object] = {
+            "com": frozen(np.column_stack([middle - factor * half, middle + factor * half])),
+            "mass": None if self.mass is None else self.mass.scaled(factor),
+            "mu": None if self.mu is None else self.mu.scaled(factor),
+            "inertia": Interval(*(1.0 + factor * (end - 1.0) for end in self.inertia)),
+        }
+        changed |= {name: Interval(*(factor * end for end in getattr(self, name))) for name in DISTURBANCES}
+        out = copy(self)
+        for name, value in changed.items():
+            object.__setattr__(out, name, value)
+        return out
+
+    @property
+    def widest(self) -> float:
+        """The scale at which the set would reach a mass, an inertia or a friction of 0; inf if at none."""
+        least = [1.0 - self.inertia.low]  # over the nominal value, what the set takes away of it
+        least += [each.half / each.middle for each in (self.mass, self.mu) if each is not None]
+        return float(1.0 / max(least)) if max(least) > 0.0 else float(np.inf)
 
 
 def _positive(name: str, value: ArrayLike, unit: str) -> Interval:

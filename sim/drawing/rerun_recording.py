@@ -10,6 +10,7 @@ Nothing is recorded while the loop runs: `record` reads the arrays of a `Run` an
     /wrench_space/...                     the notes' second figure, object axes; of a planar run
     /wrench_space/lacking/<status>        from w + J f to what was required, where that is not the same
     /plots/<plot>/<series>                those of `_series`
+    /plots/{slack,set}/...                how well the wrench holds the set of an uncertain controller, see `Margins`
     /plots/solve_us                       the only entity that holds wall-clock time
     /report                               verdict and checks
 
@@ -48,9 +49,10 @@ from pivoting.sim.drawing.colours import (
     YELLOW,
     Colour,
 )
-from pivoting.sim.drawing.drawn_world import BOLD, THIN, UP, Array
+from pivoting.sim.drawing.drawn_world import BOLD, THIN, UP, Array, Rows
 from pivoting.sim.drawing.recorded_world import PLOTS, SCENE, Film, xyzw
 from pivoting.sim.drawing.recording_id import digest
+from pivoting.sim.judging.margins_over_time import margins_over_time
 from pivoting.sim.judging.measures import predicted_slip
 from pivoting.sim.run import Run
 from pivoting.sim.whole_files import whole
@@ -76,6 +78,8 @@ TITLES = {  # plot -> title, where the legend is
     "wrench": ("applied wrench [N, N m]", "RightTop"),
     "solve_us": ("time to solve [us]", "RightTop"),
     "error": ("orientation error [deg]", "RightTop"),
+    "slack": ("slack of the worst member [N]", "RightTop"),
+    "set": ("slack over f_n, scale of the set", "RightTop"),
 }
 COMPONENTS = {  # of w by dimension
     2: {"F_u": GREEN, "F_v": LIME, "M": TEAL},
@@ -137,8 +141,8 @@ def _encoded(run: Run, world: int, rr: Any) -> bytes:
     stream = rr.RecordingStream("pivoting", recording_id=name, send_properties=False)
     memory = stream.memory_recording()
     film = Film(run, world, rr, stream)
-    series = _series(film)
-    plots = [plot for plot in TITLES if any(line.split("/")[0] == plot for line in series)]
+    series, (steps, held) = _series(film), _margins(film)
+    plots = [plot for plot in TITLES if any(line.split("/")[0] == plot for line in (*series, *held))]
     stream.send_blueprint(_blueprint(film, plots), make_active=False, make_default=True)
     film.still("report", rr.TextDocument(_report(film), media_type="text/markdown"))
     for send in (_solids, _wrench, _contacts, _wrench_space):
@@ -147,6 +151,9 @@ def _encoded(run: Run, world: int, rr: Any) -> bytes:
         film.still(f"plots/{line}", rr.SeriesLines(colors=[colour], widths=[width]))
         rows = film.rows(values.size, PLOTS)
         film.send(f"plots/{line}", rows, rr.Scalars, scalars=values[rows])
+    for line, (colour, width, values) in held.items():
+        film.still(f"plots/{line}", rr.SeriesLines(colors=[colour], widths=[width]))
+        film.send(f"plots/{line}", steps, rr.Scalars, scalars=values)
     return memory.drain_as_bytes()
 
 
@@ -306,6 +313,21 @@ def _series(film: Film) -> dict[str, tuple[Colour, float, Array]]:
     return out
 
 
+def _margins(film: Film) -> tuple[Rows, dict[str, tuple[Colour, float, Array]]]:
+    """Steps (M,) and the lines of the margins there, as `_series` has them; none of a controller without a set."""
+    run = film.run
+    found = run.margins if film.world == run.worst_world else margins_over_time(run, film.world)
+    if found is None:
+        return np.zeros(0, dtype=int), {}
+    there = found.steps < film.answers
+    lines = {
+        "slack/worst_member": (PURPLE, FINE, found.slack[there]),
+        "set/share": (PURPLE, FINE, found.share[there]),
+        "set/wrench_scale": (TEAL, FINE, found.wrench_scale[there]),
+    }
+    return found.steps[there], lines
+
+
 def _report(film: Film) -> str:
     """Verdict, checks and how to read the picture, as Markdown."""
     run, i = film.run, film.world
@@ -350,7 +372,7 @@ def _blueprint(film: Film, plots: list[str]) -> Any:
     left = rrb.Vertical(scene, below, row_shares=[10, 9])
     speed = min(1.0, 0.25 * float(film.run.time[-1]))  # four seconds to watch, at least
     return rrb.Blueprint(
-        rrb.Horizontal(left, rrb.Grid(*lines[:6], grid_columns=2), column_shares=[6, 5]),
+        rrb.Horizontal(left, rrb.Grid(*lines[: 6 if film.dim == 3 else None], grid_columns=2), column_shares=[6, 5]),
         rrb.TimePanel(state="collapsed", timeline="sim_time", loop_mode="all", playback_speed=speed),
         collapse_panels=True,
     )
