@@ -10,7 +10,7 @@ friction of the set believed, which makes it smaller. Among all ten thousand it 
 """
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from typing import Any
