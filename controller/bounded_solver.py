@@ -139,7 +139,7 @@ class BoundedSolver:
             orientation: (4,) of the object in that problem, object axes to world.
             required: (nw,) see `WrenchProblem`.
             before: (nw,) the wrench applied until now, for bounds on the rate; None if it is not known.
-            omega: (3,) measured angular velocity, world axes [rad/s], on which the cones of a set depend; None: at rest.
+            omega: (3,) measured angular velocity, world axes [rad/s], which moves the cones of a set; None: at rest.
             external: (nw,) the known wrench besides, object axes, that was subtracted in `required`; None: none.
         """
         turning = np.empty((len(self._scale), len(self._axes)))
@@ -181,7 +181,7 @@ class BoundedSolver:
         return friction_limits(self._belief.contacts.mu, floors / self._unit, self._dim, 0, apex / self._unit)
 
     def _slopes(self, cones: _Moved) -> tuple[Array, Array]:
-        """What the rows of the contacts' cones have in the columns of a; their sides are linear in apexes and floors."""
+        """What the rows of the contacts' cones have in the columns of a: their sides are linear in apex and floor."""
         each = [self._own(cones.apex_slope[..., j], cones.floor_slope[:, j]) for j in range(len(self._axes))]
         own = self._own(*cones[:2])
         linear, cone = np.zeros((1, len(own.linear), len(each))), np.zeros((1, len(own.cone), len(each)))

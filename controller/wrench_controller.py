@@ -200,7 +200,7 @@ class WrenchController:
         *_, excess = self._moved(measured, required)
         return Guarantee("strong" if len(self.contacts) == 1 else "weak", float(excess), proved=len(self.Q_f) == 2)
 
-    def _at(self, state: Motion, desired: Motion | None) -> tuple[Array, Array, tuple[Array, ...]]:
+    def _at(self, state: Motion, desired: Motion | None) -> tuple[Array, Array, tuple[Array, Array]]:
         """J, the required wrench, and orientation and angular velocity (world axes) as they are measured."""
         target = Motion(state.orientation) if desired is None else desired
         measured = self.space.lift_motion(state)[:2]

@@ -74,6 +74,11 @@ class ReferenceCheck:
     stability: str
 
     @property
+    def bounded(self) -> bool:
+        """Whether anything but a rate is bounded."""
+        return still(self.bounds).any
+
+    @property
     def answer(self) -> str:
         """ "no" if there is one moment without any wrench, else "undecided" if there is one of these, else "yes"."""
         found = {moment.answer for moment in self.moments}
@@ -107,25 +112,32 @@ class ReferenceCheck:
             "scenario": self.scenario.name,
             "changes": {key: spelled(value) for key, value in self.scenario.changes.items()},
             "answer": self.answer,
-            "bounded": self.bounds.any,
+            "bounded": self.bounded,
             "set": self.scale is not None,
             "stability": self.stability or None,
             "moments_checked": len(self.moments),
             "moments_left_out": self.left_out,
             "left_out_because": self.why or None,
             "first": None if self.first is None else _said(self.first, certificate=True),
-            "least_margin": _said(least) if self.bounds.any else None,
+            "least_margin": _said(least) if self.bounded else None,
             "feasible_scale": None if self.scale is None else self._scaled(self.scale),
             "largest_force": _said(self.largest("force")),
             "largest_moment": _said(self.largest("moment")),
-            "largest_share": _said(fullest) if self.bounds.any else None,
+            "largest_share": _said(fullest) if self.bounded else None,
             "moments": [_said(moment) for moment in self.moments],
         }
 
     def _scaled(self, scale: FeasibleScale) -> dict[str, Any]:
         certificate = None if scale.certificate is None else scale.certificate.as_dict()
-        at = {} if self.scale_at is None else {"time_s": self.scale_at.time, "theta_deg": np.rad2deg(self.scale_at.theta)}
-        return {"scale": scale.scale, "above": scale.above, "ends": scale.ends, **at, "certificate": certificate}
+        said = {"scale": scale.scale, "above": scale.above, "ends": scale.ends, "certificate": certificate}
+        if self.scale_at is not None:
+            said |= {"time_s": self.scale_at.time, "theta_deg": float(np.rad2deg(self.scale_at.theta))}
+        return said
+
+
+def still(bounds: WrenchBounds) -> WrenchBounds:
+    """The same without bounds on rates."""
+    return WrenchBounds(bounds.force, bounds.moment, bounds.component)
 
 
 def sizes(moment: CheckedMoment) -> dict[str, float]:
@@ -205,11 +217,11 @@ class _Check:
     def __init__(self, begun: Begun):
         stance = begun.belief.stances[0]
         self.controller: WrenchController = stance.controllers[0]
-        bounds = begun.bounds
         self._begun, self._unit, self._drag = begun, begun.world.unit, known_drag(begun, stance)
-        self._bounds = WrenchBounds(bounds.force, bounds.moment, bounds.component)
+        self._bounds = still(begun.bounds)
         self._solver = BoundedSolver(self.controller, self._bounds, begun.world.dt)
-        self.least_scale, self.least_at = FeasibleScale(np.inf, np.inf, "nothing", None), None
+        self.least_scale = FeasibleScale(np.inf, np.inf, "nothing", None)
+        self.least_at: int | None = None
         self._above: WrenchController | None = None  # that believes in the least scale at which something failed
         self.stability = ""
 
@@ -271,7 +283,8 @@ class _Check:
         assert known is not None
         found = feasible_scale(self.controller, state, desired, bounds=self._bounds, external=external)
         if found.scale < self.least_scale.scale:
-            self.least_scale, self.least_at = found, k
+            proof = None if found.certificate is None else self._in_si(found.certificate)
+            self.least_scale, self.least_at = found._replace(certificate=proof), k
             try:
                 self._above = replace(self.controller, uncertainty=known.scaled(found.above))
             except InputError:  # beyond which there are no worlds

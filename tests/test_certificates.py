@@ -37,7 +37,9 @@ def random_problem(rng: np.random.Generator, dim: int) -> WrenchProblem:
         normal = up + 0.4 * rng.normal(size=dim) * (rng.random() < 0.5)
         axes = np.linalg.qr(np.column_stack([normal, rng.normal(size=(dim, dim - 1))]))[0]
         axes = np.column_stack([axes[:, 1:], axes[:, 0] * np.sign(axes[:, 0] @ normal)])
-        turning = [point[0] * axis[1] - point[1] * axis[0] for axis in axes.T] if dim == 2 else np.cross(point, axes.T).T
+        turning = (
+            [point[0] * axis[1] - point[1] * axis[0] for axis in axes.T] if dim == 2 else np.cross(point, axes.T).T
+        )
         blocks.append(np.vstack([axes, np.reshape(turning, (nw - dim, dim))]))
     required = load * np.r_[up + 0.3 * rng.normal(size=dim), 0.5 * rng.normal(size=nw - dim)]
     several = int(rng.integers(1, 6)) if rng.random() < 0.5 else 1

@@ -3,16 +3,17 @@
 import json
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from pivoting.controller import FarkasCertificate, feasibility
+from pivoting.controller import FarkasCertificate
 from pivoting.sim import check_reference, simulate
 from pivoting.sim.console.command_line import main
 
+from tests.own_files import own
 from tests.test_certificates import accepted
+from tests.test_lengths import scaled
 
 SET = ["mu=0.25", "mass=0.8:1.2", "com=-0.05:0.05", "inertia=0.8:1.2"]
 Said = Callable[..., tuple[int, str, str]]
@@ -72,14 +73,16 @@ def test_a_no_names_the_first_moment_and_carries_a_proof(said: Said, tmp_path: P
     assert "< 0 with |x| <= R" in text
 
 
-def test_what_is_checked_is_what_a_run_asks_for() -> None:
-    """The wrench of the first moment is that of a run's first step, which starts on its reference."""
-    for name in ("pivot-2d", "pivot-3d", "balance-3d"):
-        found = check_reference(name, 2, force_max=40.0)
-        run = simulate(name, spread=0.0, seconds=0.15, force_max=40.0, reference="hold") if name == "balance-3d" else None
-        assert found.answer == "yes"
-        if run is not None:
-            np.testing.assert_allclose(found.moments[0].wrench, run.wrench[0, 0], atol=0.05)
+@pytest.mark.parametrize(
+    ("name", "keys"),
+    [("pivot-2d", {"force_max": "0.6w", "mass": (0.9, 1.1)}), ("pivot-3d", {}), ("balance-3d", {})],
+    ids=["a set, a bound that binds", "an edge", "a vertex"],
+)
+def test_what_is_checked_is_what_a_run_asks_for(name: str, keys: dict) -> None:
+    """The first moment is a run's first step, where that starts on its reference."""
+    run, found = simulate(name, seconds=0.15, spread=0.0, **keys), check_reference(name, 2, spread=0.0, **keys)
+    assert found.answer == "yes"
+    np.testing.assert_allclose(found.moments[0].wrench, run.wrench[0, 0], atol=1e-4 * np.abs(run.required).max())
 
 
 def test_without_bounds_it_is_always_a_yes_and_says_so(said: Said) -> None:
@@ -123,11 +126,21 @@ def test_wrong_uses_are_one_line_and_exit_2(said: Said, words: list[str], messag
     assert told.count("\n") == 1
 
 
-def test_the_unit_of_length_does_not_matter() -> None:
-    """A proof in other units of force and length says the same."""
-    found = check_reference("pivot-2d", 2, force_max=1.0, moment_max=0.1)
-    assert found.first is not None
-    proof = found.first.certificate
-    assert proof is not None
-    assert replace(proof, force=2.0 * proof.force).gap == proof.gap
-    assert feasibility is not None
+def test_figures_are_in_si_whatever_the_unit_of_the_file_is(tmp_path: Path) -> None:
+    def found(unit: float, most: str) -> dict:
+        keys = {"force_max": most, "moment_max": 0.2, "mass": (0.9, 1.0)}
+        told = check_reference(own(tmp_path, scaled(unit)), 3, **keys).summary()
+        first = told["first"]
+        proof = [] if first is None else [first["certificate"][f"unit_of_{each}"] for each in ("force_N", "length_m")]
+        return {
+            "answer": told["answer"],
+            "scale": [told["feasible_scale"]["scale"], *proof],
+            "margins": [moment["margin_N"] for moment in told["moments"]],
+            "wrench": [moment["wrench"] for moment in told["moments"] if moment["wrench"]],
+        }
+
+    for most, answer in (("1w", "yes"), ("0.02w", "no")):
+        right, other = found(1.0, most), found(1e-3, most)
+        assert right["answer"] == other["answer"] == answer
+        for key in ("scale", "margins", "wrench"):
+            np.testing.assert_allclose(other[key], right[key], rtol=1e-3, atol=1e-4)

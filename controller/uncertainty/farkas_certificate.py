@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
@@ -93,4 +94,4 @@ class FarkasCertificate:
     def _round(self, values: Array) -> Iterator[Array]:
         """The parts (order,) of values (m,) that belong to the second-order cones."""
         ends = np.cumsum([self.cones.zero + self.cones.linear, *self.cones.orders])
-        return (values[first:last] for first, last in zip(ends[:-1], ends[1:], strict=True))
+        return (values[first:last] for first, last in pairwise(ends.tolist()))

@@ -116,9 +116,7 @@ def _state(problem: WrenchProblem, bounds: WrenchBounds) -> _Stated:
     return _Stated(A, np.concatenate(sides), cones, sizes, MOST * force if limited else np.inf, force, length)
 
 
-def greatest_size(
-    J: Array, b: Array, mu: Array, apex: Array, bounds: WrenchBounds, unit: Array
-) -> tuple[float, bool]:
+def greatest_size(J: Array, b: Array, mu: Array, apex: Array, bounds: WrenchBounds, unit: Array) -> tuple[float, bool]:
     """A bound on |x| = |(f, w)| for all that satisfies the constraints, and whether a limit on f_n is needed for it.
 
     Let the force F of w be bounded by F_max, and let u be a direction, object axes, in which every force of every

@@ -20,7 +20,12 @@ POINTS = 50  # of sim.reference_check, which imports what takes long
 @click.option("--out", type=click.Path(path_type=Path), help="Also write the certificate of a no to a .json file.")
 @json_option("Print one JSON object and nothing else.")
 def check(
-    scenario: str | None, settings: tuple[str, ...], points: int, out: Path | None, as_json: JsonOutput | None, **own: Any
+    scenario: str | None,
+    settings: tuple[str, ...],
+    points: int,
+    out: Path | None,
+    as_json: JsonOutput | None,
+    **own: Any,
 ) -> int:
     """Find out, before it starts, whether SCENARIO's reference can be followed within its bounds on the wrench.
 

@@ -30,7 +30,7 @@ def print_check(console: Console, found: ReferenceCheck) -> None:
     if found.bounds.rated:
         line("bounds on rates are not checked", "yellow")
     _print_answer(line, found)
-    if found.bounds.any:
+    if found.bounded:
         line(f"least margin: {_signed(found.tightest.margin)} N {_where(found.tightest)}")
         if found.scale is not None:
             line(_scaled(found.scale, found.scale_at))
@@ -38,13 +38,13 @@ def print_check(console: Console, found: ReferenceCheck) -> None:
         largest = found.largest(part)
         if largest is not None:
             line(f"largest {part} of the smallest wrench: {sizes(largest)[part]:.4g} {unit} {_where(largest)}")
-    if found.bounds.any and found.fullest is not None:
+    if found.bounded and found.fullest is not None:
         line(f"of a bound at most {100.0 * found.fullest.share:.3g} % is used, {_where(found.fullest)}")
 
 
-def _print_answer(line: Callable[[str, str], None], found: ReferenceCheck) -> None:
+def _print_answer(line: Callable[..., None], found: ReferenceCheck) -> None:
     """Yes, no or undecided."""
-    if not found.bounds.any:
+    if not found.bounded:
         line("yes: without force_max or moment_max a wrench that is large enough always exists", "green")
         return
     if found.first is None:
