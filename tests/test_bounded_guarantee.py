@@ -87,10 +87,10 @@ def test_no_world_of_the_set_slides_where_a_grip_is_guaranteed(dim: int) -> None
 def test_where_none_is_guaranteed_no_other_acceleration_allows_one() -> None:
     """On a grid of accelerations that any answer could give up."""
     rng, lost = np.random.default_rng(5), 0
-    while lost < 3:
+    for _ in range(20):
         controller, state, desired = planar(rng, "contact")
         answer, problem, bounds = bounded(controller, state, desired, rng.uniform(0.2, 0.6))
-        if answer.guaranteed:
+        if answer.guaranteed or lost == 3:
             continue
         lost += 1
         q, omega, _ = controller.space.lift_motion(state)
@@ -102,4 +102,5 @@ def test_where_none_is_guaranteed_no_other_acceleration_allows_one() -> None:
                 problem.jacobian, problem.required + a * B, controller.belief.contacts.mu, f_min=floors, apex=apex
             )
             assert feasibility(moved, bounds).answer != "yes", a
-        assert not answer.exact or bounds.excess(answer.wrench) < 1e-6
+        assert bounds.excess(answer.wrench) < 1e-6
+    assert lost == 3
