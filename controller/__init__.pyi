@@ -29,6 +29,9 @@ from .solvers.solve import methods as methods, pyramid_excess as pyramid_excess,
 from .wrench_bounds import WrenchBounds as WrenchBounds
 from .wrench_controller import WrenchController as WrenchController
 from .wrench_problem import WrenchProblem as WrenchProblem, wrench_weight as wrench_weight
+from .uncertainty.farkas_certificate import FarkasCertificate as FarkasCertificate
+from .uncertainty.feasibility import Feasibility as Feasibility, feasibility as feasibility
+from .uncertainty.feasible_scale import FeasibleScale as FeasibleScale, feasible_scale as feasible_scale
 from .uncertainty.guarantee import Guarantee as Guarantee
 from .uncertainty.margins import FrictionalStability as FrictionalStability, Margins as Margins
 from .uncertainty.price import Price as Price, price as price

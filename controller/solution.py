@@ -11,9 +11,10 @@ TOLERANCE = 1e-7  # relative KKT residual; the closed form stays below 1e-11, in
 INSCRIBED = "inscribed"  # optimal for an inscribed pyramid, which is not the problem that was asked
 # Indexed by the status codes of a loop. "bounded": certified, but the bounds did not allow what was required;
 # "uncertified": by a control of the user's own, which solves no problem; "repeated": no new answer, but the last one
-# again; "safe": no answer, but the action of a safe state.
-STATUS = ("solved", "inaccurate", "failed", "bounded", "uncertified", "repeated", "safe")
-SOLVED, INACCURATE, FAILED, BOUNDED, UNCERTIFIED, REPEATED, SAFE = range(len(STATUS))
+# again; "safe": no answer, but the action of a safe state; "unguaranteed": certified for the believed world, but the
+# bounds did not allow a grip in all worlds of the controller's set.
+STATUS = ("solved", "inaccurate", "failed", "bounded", "uncertified", "repeated", "safe", "unguaranteed")
+SOLVED, INACCURATE, FAILED, BOUNDED, UNCERTIFIED, REPEATED, SAFE, UNGUARANTEED = range(len(STATUS))
 
 
 @dataclass(frozen=True, eq=False)

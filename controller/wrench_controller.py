@@ -171,8 +171,7 @@ class WrenchController:
         J, required, measured = self._at(state, desired)
         held, floors, apex = self.belief.contacts, self.belief.contacts.f_min, None
         if self.uncertainty is not None:
-            cones, members, _ = self._moved(measured, required)
-            apex, floors = cones.apex[:members], np.maximum(cones.floor, 0.0)
+            apex, floors = self.moved_cones(*measured, required)
         if external is not None:
             required -= array("external", external, required.shape)
         # as it was given, where it is: (1 - margin) mu is to be the same to the last bit
@@ -180,6 +179,16 @@ class WrenchController:
         return WrenchProblem(
             J, required, mu, f_min=floors, margin=self.margin, Q_w=self.Q_w, Q_f=self.Q_f, apex=apex
         )  # fmt: skip
+
+    def moved_cones(self, orientation: Array, omega: Array, required: Array) -> tuple[Array, Array]:
+        """The apexes (V, K, d) and floors (K,) [N] that all members of the controller's set ask for.
+
+        Args:
+            orientation: (4,), object axes to world.  omega: (3,) world axes [rad/s].  required: (nw,) the wrench that
+                contacts and all others make together, object axes.
+        """
+        cones, members, _ = self._moved((orientation, omega), np.array(required))
+        return cones.apex[:members], np.maximum(cones.floor, 0.0)
 
     def guarantee(self, state: Motion, desired: Motion | None = None) -> Guarantee:
         """What the answer to `problem` guarantees for the worlds of the controller's set; arguments as there.
@@ -212,7 +221,7 @@ class WrenchController:
             applied = applied + array("external", external, applied.shape)
         return margins(self, *self.space.lift_motion(state)[:2], applied)
 
-    def _at(self, state: Motion, desired: Motion | None) -> tuple[Array, Array, tuple[Array, ...]]:
+    def _at(self, state: Motion, desired: Motion | None) -> tuple[Array, Array, tuple[Array, Array]]:
         """J, the required wrench, and orientation and angular velocity (world axes) as they are measured."""
         target = Motion(state.orientation) if desired is None else desired
         measured = self.space.lift_motion(state)[:2]

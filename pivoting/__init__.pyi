@@ -9,6 +9,7 @@ from .errors import PivotingError as PivotingError
 from .sim.attachment import attach as attach
 from .sim.fleet import Fleet as Fleet
 from .sim.judging.assertions import assert_sticking as assert_sticking, assert_tracking as assert_tracking
+from .sim.reference_check import check_reference as check_reference
 from .sim.run import Run as Run
 from .sim.saved_run import load as load
 from .sim.scenarios.scenario import Scenario as Scenario

@@ -11,7 +11,7 @@ from pivoting.sim.engine_log import engine_log
 from pivoting.sim.experiment import freeze
 from pivoting.sim.fleet import SAMPLES, Fleet, Handed, WorldSamples
 from pivoting.sim.judging.advice import reasons, remedies
-from pivoting.sim.judging.findings import Findings, bounded_steps
+from pivoting.sim.judging.findings import Findings, bounded_steps, unguaranteed_steps
 from pivoting.sim.judging.measures import Measures, slip_floor_unknown
 from pivoting.sim.judging.undeclared_contacts import stray_words
 from pivoting.sim.pipeline.plan_log import Event, PlanLog
@@ -111,7 +111,11 @@ class _Kept:
             self._most_strayed = strayed
             found = found._replace(strays=stray_words(run, first))
         unknown = found.slip_floor_unknown or slip_floor_unknown(run, first, self._worlds)
-        self._found = found._replace(slip_floor_unknown=unknown, bounded_steps=found.bounded_steps + bounded_steps(run))
+        self._found = found._replace(
+            slip_floor_unknown=unknown,
+            bounded_steps=found.bounded_steps + bounded_steps(run),
+            unguaranteed_steps=found.unguaranteed_steps + unguaranteed_steps(run),
+        )
 
     def fleet(self, begun: Begun, handed: Handed, warned: tuple[str, ...]) -> Fleet:
         """The fleet, without why it failed."""

@@ -5,6 +5,7 @@ from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pivoting.controller.validate import fail
 from pivoting.models.errors import ModelError
 from pivoting.sim.joint_drag import drag_wrench
@@ -85,14 +86,20 @@ def decide(
 
 def _law_control(begun: Begun, solver: LawSolver, stance: Stance) -> LawControl:
     """The law of a stance on the scenario's own reference."""
+    return LawControl(solver, begun.told, known_drag(begun, stance))
+
+
+def known_drag(begun: Begun, stance: Stance) -> NDArray[np.float64]:
+    """(N+1 or 1, W or 1, nw) the drag of the body's joints on the reference, object axes."""
     body = begun.belief.attached.body
-    drag = np.stack([drag_wrench(body, controller, *begun.told) for controller in stance.controllers], axis=1)
-    return LawControl(solver, begun.told, drag)
+    return np.stack([drag_wrench(body, controller, *begun.told) for controller in stance.controllers], axis=1)
 
 
 def _bounded(begun: Begun, control: Control, stance: Stance) -> Control:
     """A control within the scenario's bounds, where it has any."""
-    return BoundedControl(control, stance.controllers, begun.bounds, begun.world.dt) if begun.bounds.any else control
+    if not begun.bounds.any:
+        return control
+    return BoundedControl(control, stance.controllers, begun.bounds, begun.world.dt, known_drag(begun, stance))
 
 
 def _planned(begun: Begun, law: LawSolver, open_loop: bool) -> Control:

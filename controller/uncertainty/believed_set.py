@@ -65,6 +65,12 @@ def set_about(
     )
 
 
+def vertices(unknown: BelievedSet) -> int:
+    """How many members the set has at the ends of its intervals, for each of which `state_cones` moves the cones."""
+    widths = [np.ptp(unknown.mass), np.ptp(unknown.inertia), *np.ptp(unknown.com, axis=1)]
+    return int(2 ** np.count_nonzero(widths))
+
+
 def _spread(points: Array) -> Array:
     """(3 K, 6) the smallest contact forces that make a wrench; moments count in units of the contacts' lever."""
     size = float(np.linalg.norm(points, axis=1).max())

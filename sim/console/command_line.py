@@ -1,4 +1,4 @@
-"""The command line: `pivoting example | list | contacts | run | sweep | render | view | identify`.
+"""The command line: `pivoting example | list | contacts | check | run | sweep | render | view | identify`.
 
 Exit 0: pass, 1: fail, 2: one line of why.
 """
@@ -13,6 +13,7 @@ from typing import Any
 import click
 from pivoting import __version__
 from pivoting.errors import PivotingError
+from pivoting.sim.console.check_command import check
 from pivoting.sim.console.identify_command import identify
 from pivoting.sim.console.scenario_options import scenario_options
 from pivoting.sim.console.stdout import JsonOutput, console, json_option
@@ -28,6 +29,7 @@ def cli() -> None:
     """The smallest wrench that balances or pivots an object on a frictional contact, proved in MuJoCo."""
 
 
+cli.add_command(check)
 cli.add_command(sweep)
 
 

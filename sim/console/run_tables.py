@@ -148,6 +148,9 @@ def _print_notes(console: Console, run: Experiment, summary: Mapping[str, Any]) 
         steps = run.worlds * (len(run.time) - 1)
         told = f"{summary['bounded_steps']} of {steps} steps: the bounds did not allow what was asked for"
         console.print(told, style="yellow", soft_wrap=True)
+    if lost := summary["unguaranteed_steps"]:
+        told = f"in {lost} of them they did not allow a grip in all worlds of the set: nothing was guaranteed there"
+        console.print(told, style="yellow", soft_wrap=True)
     if repeated := int(run.measures.repeated_steps.sum()):
         steps = run.worlds * (len(run.time) - 1)
         console.print(f"{repeated} of {steps} steps: the last answer again", style="yellow", soft_wrap=True)

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pivoting.controller.solution import BOUNDED, FAILED, INACCURATE, REPEATED, SAFE, STATUS
+from pivoting.controller.solution import BOUNDED, FAILED, INACCURATE, REPEATED, SAFE, STATUS, UNGUARANTEED
 from pivoting.controller.solution_space import SolutionSpace
 from pivoting.controller.validate import fail
 from pivoting.errors import PivotingError
@@ -67,6 +67,7 @@ LACKING = {  # status of an answer that does not give what is required -> what i
     FAILED: "no answer, nothing applied: lacking",
     REPEATED: "the last answer again: lacking",
     SAFE: "safe state: lacking",
+    UNGUARANTEED: "unguaranteed: lacking",
 }
 TITLES = {  # plot -> title, where the legend is
     "angle": ("angle [deg]", "LeftTop"),

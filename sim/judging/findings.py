@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from pivoting.controller.solution import BOUNDED
+from pivoting.controller.solution import BOUNDED, UNGUARANTEED
 from pivoting.sim.judging.advice import reasons, remedies
 from pivoting.sim.judging.measures import slip_floor_unknown
 
@@ -19,6 +19,7 @@ class Findings(NamedTuple):
         bounded_steps: steps of all worlds in which the bounds did not allow what was required.
         strays: which geoms met in contacts that are not declared.
         reasons: why the worst world failed, a sentence each.  remedies: what might hold it, as the command line has it.
+        unguaranteed_steps: those of `bounded_steps` in which no grip in all worlds of the controller's set was allowed.
     """
 
     slip_floor_unknown: str
@@ -26,15 +27,26 @@ class Findings(NamedTuple):
     strays: list[str]
     reasons: list[str]
     remedies: list[str]
+    unguaranteed_steps: int = 0
 
 
 def find(run: "Run") -> Findings:
     """The findings of a run."""
     return Findings(
-        slip_floor_unknown(run), bounded_steps(run), run.strays, reasons(run), [each.setting for each in remedies(run)]
+        slip_floor_unknown(run),
+        bounded_steps(run),
+        run.strays,
+        reasons(run),
+        [each.setting for each in remedies(run)],
+        unguaranteed_steps(run),
     )
 
 
 def bounded_steps(run: "Run") -> int:
     """See `Findings`."""
-    return int(np.count_nonzero(run.status == BOUNDED))
+    return int(np.count_nonzero(np.isin(run.status, (BOUNDED, UNGUARANTEED))))
+
+
+def unguaranteed_steps(run: "Run") -> int:
+    """See `Findings`."""
+    return int(np.count_nonzero(run.status == UNGUARANTEED))

@@ -48,6 +48,7 @@ def summary(run: "Experiment") -> dict[str, Any]:
         "wall_s": run.wall_s,
         "real_time_factor": run.worlds * float(run.time[-1]) / run.wall_s,
         "bounded_steps": found.bounded_steps,
+        "unguaranteed_steps": found.unguaranteed_steps,
         "reasons": found.reasons,
         "remedies": found.remedies,
         "undeclared_contacts": found.strays,

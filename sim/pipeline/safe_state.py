@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pivoting.controller.lowering import Lowering
 from pivoting.controller.pivot_model import PivotModel
 from pivoting.controller.rotations import rotation_matrix
-from pivoting.controller.solution import BOUNDED, REPEATED, SAFE, SOLVED, STATUS, UNCERTIFIED
+from pivoting.controller.solution import BOUNDED, REPEATED, SAFE, SOLVED, STATUS, UNCERTIFIED, UNGUARANTEED
 from pivoting.controller.validate import fail
 from pivoting.sim.pipeline.plan_log import Event
 from pivoting.sim.pipeline.stages import (
@@ -29,7 +29,7 @@ from pivoting.sim.pipeline.stages import (
 Array = NDArray[np.float64]
 LOST = 0.05  # for how long an object that is pressed may have no contact before it is let go [s]
 SLID = 0.02  # of the lever: a contact that seems to have moved by more has slid
-ANSWERED = np.isin(np.arange(len(STATUS)), (SOLVED, BOUNDED, UNCERTIFIED))  # by status
+ANSWERED = np.isin(np.arange(len(STATUS)), (SOLVED, BOUNDED, UNCERTIFIED, UNGUARANTEED))  # by status
 
 
 class SafeState:
