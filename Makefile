@@ -9,7 +9,7 @@ TESTS := -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 UV := .venv-lock/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
 	--custom-compile-command "make lock"
 
-.PHONY: help demo test check docs latest bench evidence kills guarantee learning study engines objects figures lock clean
+.PHONY: help demo test check docs latest bench evidence fuzz kills guarantee learning study engines objects figures lock clean
 
 demo: $(STAMP)  ## the worked example, a block pivoted in MuJoCo, its verdict, a recording and a picture in out/
 	@mkdir -p out
@@ -58,6 +58,9 @@ study: $(STAMP)  ## how fast each formulation can pivot, and what a horizon save
 	$(BIN)/python benchmarks/bench_effort.py --json benchmarks/results/effort.json
 
 # Each takes a few seconds, so not in `make test`.
+fuzz: $(STAMP)  ## every public entry with 50,000 hostile inputs in all
+	$(BIN)/python benchmarks/fuzz.py --json benchmarks/results/fuzz.json
+
 kills: $(STAMP)  ## sweeps that are killed at 20 random moments and resumed: no row is lost, doubled or changed
 	$(BIN)/python benchmarks/kill_sweeps.py --json benchmarks/results/kills.json
 
