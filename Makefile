@@ -57,7 +57,7 @@ study: $(STAMP)  ## how fast each formulation can pivot, and what a horizon save
 	$(BIN)/python benchmarks/bench_formulations.py --json benchmarks/results/formulations.json
 	$(BIN)/python benchmarks/bench_effort.py --json benchmarks/results/effort.json
 
-# Each takes a few seconds, so not in `make test`.
+# Each takes seconds or a few minutes, so not in `make test`.
 fuzz: $(STAMP)  ## every public entry with 50,000 hostile inputs in all
 	$(BIN)/python benchmarks/fuzz.py --json benchmarks/results/fuzz.json
 

@@ -18,9 +18,18 @@ class InputError(PivotingError, ValueError):
 
 def fail(name: str, value: object, allowed: str) -> InputError:
     """The error to raise for an argument `name` whose `value` is not `allowed`."""
-    shown = str(value.tolist()) if isinstance(value, np.ndarray) else repr(value)
-    name = name if name.isprintable() else repr(name)  # which may be a user's own, and is to stay in one line
-    return InputError(f"{name} = {shown if len(shown) < 120 else shown[:117] + '...'}: must be {allowed}")
+    return InputError(f"{in_one_line(name)} = {shown(value)}: must be {allowed}")
+
+
+def shown(value: object) -> str:
+    """A value as an error shows it: in one line, and cut off where it is long."""
+    text = " ".join((str(value.tolist()) if isinstance(value, np.ndarray) else repr(value)).splitlines())
+    return text if len(text) < 120 else text[:117] + "..."
+
+
+def in_one_line(name: str) -> str:
+    """A name, which may be a user's own, as an error shows it."""
+    return name if name.isprintable() else repr(name)
 
 
 def frozen(values: AnyArray) -> AnyArray:

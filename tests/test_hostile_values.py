@@ -73,6 +73,8 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
         (lambda: Body(1.0, RAGGED), "inertia"),
         (lambda: Uncertainty(com=RAGGED, dim=2), "com"),
         (lambda: Uncertainty(mass=RAGGED, dim=2), "mass"),
+        (lambda: Uncertainty(dim=np.zeros((3, 3))), "dim"),  # type: ignore[arg-type]
+        (lambda: Uncertainty(com=np.zeros((3, 2)), dim=[]), "dim"),  # type: ignore[arg-type]
         (lambda: controller().problem(Motion(LEVEL, np.ones(4))), "velocity"),
         (lambda: controller().problem(Motion(LEVEL), Motion(LEVEL, 0.0, "a")), "acceleration"),
     ],
@@ -98,7 +100,7 @@ def test_a_setting_that_is_not_printable_is_refused() -> None:
 
 def test_a_log_without_times_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
-    file.write_text("theta_deg,wrench_Fu_N,wrench_Fv_N,wrench_M_N_m\n" + "10,1,2,0.1\n" * 4)
+    file.write_text("ti\x0bme_s,theta_deg,wrench_Fu_N,wrench_Fv_N,wrench_M_N_m\n" + "0,10,1,2,0.1\n" * 4)
     with pytest.raises(InputError, match="has no column time_s"):
         table_log(LogTable(file), np.array([0.05, 0.06]), 9.81)
 

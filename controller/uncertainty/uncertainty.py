@@ -182,10 +182,12 @@ def _about_zero(name: str, value: ArrayLike) -> Interval:
 
 def _box(value: ArrayLike, dim: int | None) -> Array:
     """(d, 2) of one interval for all axes, or one for each."""
-    if dimensions(value) == 2:
-        return frozen(np.array([_about_zero("com", row) for row in array("com", value, (dim, 2))]))
-    if dim not in (2, 3):
+    box = dimensions(value) == 2
+    if not (isinstance(dim, int | np.integer) and dim in (2, 3)) and not (box and dim is None):
         raise fail("dim", dim, "2 or 3, where com is one interval for all axes")
+    if box:
+        return frozen(np.array([_about_zero("com", row) for row in array("com", value, (dim, 2))]))
+    assert dim is not None
     return frozen(np.array([_about_zero("com", value)] * dim))
 
 
