@@ -9,7 +9,8 @@ TESTS := -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 UV := .venv-lock/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
 	--custom-compile-command "make lock"
 
-.PHONY: help demo test check docs latest bench evidence kills guarantee sweeps learning study engines objects figures lock clean
+.PHONY: help demo test check docs latest bench evidence fuzz kills guarantee sweeps learning study engines objects figures \
+	lock clean
 
 demo: $(STAMP)  ## the worked example, a block pivoted in MuJoCo, its verdict, a recording and a picture in out/
 	@mkdir -p out
@@ -39,6 +40,7 @@ bench: .venv/.peers  ## timings, against peers (the extra [bench], 300 MB), into
 	$(BIN)/python benchmarks/bench_loop.py --json benchmarks/results/loop.json
 	$(BIN)/python benchmarks/bench_solve.py --json benchmarks/results/solve.json
 	$(BIN)/python benchmarks/bench_horizon.py --json benchmarks/results/horizon.json
+	$(BIN)/python benchmarks/bench_fleet.py --json benchmarks/results/fleet.json
 
 # 200,000 planar and 100,000 other random problems, 256 perturbed worlds of every scenario: minutes, so not in `make test`.
 evidence: $(STAMP)  ## random problems by the hundred thousand, 256 worlds of every scenario
@@ -48,6 +50,7 @@ evidence: $(STAMP)  ## random problems by the hundred thousand, 256 worlds of ev
 
 guarantee: $(STAMP)  ## random sets against a search for their worst members, vertices in MuJoCo, what a guarantee costs
 	$(BIN)/python benchmarks/evidence_guarantee.py --json benchmarks/results/guarantee.json
+	PIVOTING_SETS=50 $(BIN)/python -m pytest -q tests/test_slack_bounds.py -k proved
 
 sweeps: $(STAMP)  ## ten thousand worlds in which everything is wrong at once, with a guarantee, without, and with a constant floor
 	$(BIN)/python benchmarks/evidence_sweep.py --json benchmarks/results/sweep.json
@@ -60,7 +63,10 @@ study: $(STAMP)  ## how fast each formulation can pivot, and what a horizon save
 	$(BIN)/python benchmarks/bench_formulations.py --json benchmarks/results/formulations.json
 	$(BIN)/python benchmarks/bench_effort.py --json benchmarks/results/effort.json
 
-# Each takes a few seconds, so not in `make test`.
+# Each takes seconds or a few minutes, so not in `make test`.
+fuzz: $(STAMP)  ## every public entry with 50,000 hostile inputs in all
+	$(BIN)/python benchmarks/fuzz.py --json benchmarks/results/fuzz.json
+
 kills: $(STAMP)  ## sweeps that are killed at 20 random moments and resumed: no row is lost, doubled or changed
 	$(BIN)/python benchmarks/kill_sweeps.py --json benchmarks/results/kills.json
 

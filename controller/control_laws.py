@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import Self
 
-import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.validate import number, one_of, positive_definite
+from pivoting.controller.validate import dimensions, number, one_of, positive_definite
 
+FASTEST = 1e150  # [1/s], whose square is a number
 FORMULATIONS = ("static", "quasi-dynamic", "quasi-dynamic-velocity", "dynamic")
 
 
@@ -24,7 +24,7 @@ class Body:
 
     def __post_init__(self) -> None:
         number("mass", self.mass, above=0.0, unit="kg")
-        if np.ndim(self.inertia) == 0:
+        if dimensions(self.inertia) == 0:
             number("inertia", self.inertia, above=0.0, unit="kg m^2")  # type: ignore[arg-type]
         else:
             positive_definite("inertia", self.inertia, 3)
@@ -79,7 +79,7 @@ class Law:
             h: length of a step [s], at the end of which the object is to be on the reference.
             velocity: let the step start with the velocity that the object has, not from rest; see erratum 7.
         """
-        kp = number("h", h, above=0.0, unit="s") ** -2
+        kp = number("h", h, at_least=1.0 / FASTEST, unit="s") ** -2
         if velocity:
             return cls("quasi-dynamic-velocity", kp, 1.0 / h, 0.0, 0.0)
         return cls("quasi-dynamic", kp, 0.0, 0.0, 0.0)
@@ -87,7 +87,7 @@ class Law:
     @classmethod
     def dynamic(cls, bandwidth: float = 40.0, damping: float = 1.0) -> Self:
         """Let errors decay like an oscillator of frequency `bandwidth` [rad/s] and damping ratio `damping`."""
-        number("bandwidth", bandwidth, above=0.0, unit="rad/s")
+        number("bandwidth", bandwidth, above=0.0, at_most=FASTEST, unit="rad/s")
         number("damping", damping, above=0.0)
         return cls("dynamic", bandwidth**2, 2.0 * damping * bandwidth, 1.0, 1.0)
 

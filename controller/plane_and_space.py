@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from pivoting.controller.kernels.compilation import subroutine
 from pivoting.controller.motion import Motion
 from pivoting.controller.rotations import CONJUGATE, IDENTITY, quaternion_product, rotation_matrix
-from pivoting.controller.validate import Array, array, fail, unit_quaternions
+from pivoting.controller.validate import Array, array, dimensions, fail, for_each, unit_quaternions
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class Space:
         """The inertia tensor (3, 3) [kg m^2] about the CoM, in object axes; a planar number is the inertia about y."""
         if self.dim == 3:
             return array("inertia", inertia, (3, 3))
-        if np.ndim(inertia) != 0:
+        if dimensions(inertia) != 0:
             raise fail("inertia", inertia, "a number in the plane, about the plane's normal [kg m^2]")
         return np.diag([0.0, float(np.asarray(inertia)), 0.0])
 
@@ -78,13 +78,12 @@ class Space:
         if self.dim == 2:
             values = []
             for name, value in zip(Motion._fields, motion, strict=True):
-                if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf" or not np.isfinite(value):
+                if dimensions(value) != 0 or np.asarray(value).dtype.kind not in "iuf" or not np.isfinite(value):
                     raise fail(name, value, "a finite number in the plane")
                 values.append(float(value))  # type: ignore[arg-type]
             return self.orientation(values[0]), self.axial(values[1]), self.axial(values[2])
         quaternion = unit_quaternions("orientation", motion.orientation, (4,))
-        rates = [np.broadcast_to(np.asarray(rate, dtype=float), (3,)) for rate in motion[1:]]
-        return quaternion, array("velocity", rates[0], (3,)), array("acceleration", rates[1], (3,))
+        return quaternion, for_each("velocity", motion.velocity, 3), for_each("acceleration", motion.acceleration, 3)
 
 
 def space(dim: int, base: ArrayLike = IDENTITY) -> Space:

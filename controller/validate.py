@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from pivoting.errors import PivotingError
 
 Array = NDArray[np.float64]
+MOST = int(np.finfo(float).max)
 AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
 
 
@@ -17,8 +18,18 @@ class InputError(PivotingError, ValueError):
 
 def fail(name: str, value: object, allowed: str) -> InputError:
     """The error to raise for an argument `name` whose `value` is not `allowed`."""
-    shown = str(value.tolist()) if isinstance(value, np.ndarray) else repr(value)
-    return InputError(f"{name} = {shown if len(shown) < 120 else shown[:117] + '...'}: must be {allowed}")
+    return InputError(f"{in_one_line(name)} = {shown(value)}: must be {allowed}")
+
+
+def shown(value: object) -> str:
+    """A value as an error shows it: in one line, and cut off where it is long."""
+    text = " ".join((str(value.tolist()) if isinstance(value, np.ndarray) else repr(value)).splitlines())
+    return text if len(text) < 120 else text[:117] + "..."
+
+
+def in_one_line(name: str) -> str:
+    """A name, which may be a user's own, as an error shows it."""
+    return name if name.isprintable() else repr(name)
 
 
 def frozen(values: AnyArray) -> AnyArray:
@@ -43,6 +54,19 @@ def array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
     if not np.isfinite(out).all():
         raise fail(name, value, "finite")
     return frozen(out)
+
+
+def dimensions(value: object) -> int:
+    """How many dimensions an array of `value` would have; -1 of what is ragged, and none."""
+    try:
+        return np.ndim(value)  # type: ignore[arg-type]
+    except ValueError:
+        return -1
+
+
+def for_each(name: str, value: ArrayLike, count: int) -> Array:
+    """A read-only (count,) of `value`, which is one number for all or one for each."""
+    return array(name, np.broadcast_to(value, (count,)) if dimensions(value) == 0 else value, (count,))
 
 
 def _shown(shape: tuple[int | None, ...]) -> str:
@@ -70,6 +94,10 @@ def number(
 ) -> float:
     """A finite float inside the given open (`above`, `below`) and closed (`at_least`, `at_most`) bounds."""
     real = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    if isinstance(value, int):  # of which NumPy takes only those that its integers hold
+        if abs(value) > MOST:
+            raise fail(name, value, "a number that a float can hold")
+        value = value if isinstance(value, bool) else float(value)
     if not (real and np.isfinite(value) and above < value < below and at_least <= value <= at_most):
         limits = ((">", above), ("<", below), (">=", at_least), ("<=", at_most))
         bounds = " and ".join(f"{word} {bound:g}" for word, bound in limits if np.isfinite(bound))
@@ -91,5 +119,5 @@ def positive_definite(name: str, value: ArrayLike, size: int) -> Array:
 
 def one_of(name: str, value: object, allowed: tuple[str, ...]) -> None:
     """Raise unless `value` is one of the `allowed` words."""
-    if value not in allowed:
+    if not isinstance(value, str) or value not in allowed:
         raise fail(name, value, "one of " + ", ".join(allowed))

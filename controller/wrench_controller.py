@@ -25,7 +25,7 @@ from pivoting.controller.uncertainty.guarantee import Guarantee
 from pivoting.controller.uncertainty.margins import Margins, margins
 from pivoting.controller.uncertainty.uncertainty import Uncertainty
 from pivoting.controller.units import Units, lever, units
-from pivoting.controller.validate import Array, array, fail, number, positive_definite
+from pivoting.controller.validate import Array, array, dimensions, fail, number, positive_definite
 from pivoting.controller.wrench_problem import WrenchProblem, wrench_weight
 
 
@@ -85,7 +85,8 @@ class WrenchController:
         put(self, "body", body)
         put(self, "contacts", held)
         put(self, "law", law)
-        put(self, "gravity", array("gravity", gravity, (3,) if np.size(gravity) == 3 else (dim,)))
+        lifted = dimensions(gravity) == 1 and np.size(gravity) == 3
+        put(self, "gravity", array("gravity", gravity, (3,) if lifted else (dim,)))
         put(self, "base", space(dim, base).base)
         put(self, "margin", number("margin", margin, at_least=0.0, below=1.0))
         weight = wrench_weight(dim, reach) if Q_w is None else Q_w

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from pivoting.controller.cone_constraints import friction_limits
 from pivoting.controller.friction_pyramid import Polygon, polygon
 from pivoting.controller.kkt_residual import kkt_residual
-from pivoting.controller.validate import Array, array, fail, number, positive_definite
+from pivoting.controller.validate import Array, array, fail, for_each, number, positive_definite
 
 
 class StandardForm(NamedTuple):
@@ -79,10 +79,10 @@ class WrenchProblem:
         if n == 0 or n % dim:
             raise fail("jacobian", J, f"with {dim} columns for each contact, at least one contact")
         K = n // dim
-        mu_all = array("mu", np.broadcast_to(mu, (K,)) if np.ndim(mu) == 0 else mu, (K,))
+        mu_all = for_each("mu", mu, K)
         if (mu_all <= 0.0).any():
             raise fail("mu", mu_all if K > 1 else float(mu_all[0]), "> 0")
-        floors = array("f_min", np.broadcast_to(f_min, (K,)) if np.ndim(f_min) == 0 else f_min, (K,))
+        floors = for_each("f_min", f_min, K)
         if (floors < 0.0).any():
             raise fail("f_min", floors if K > 1 else float(floors[0]), ">= 0 [N]")
         put = object.__setattr__

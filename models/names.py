@@ -22,7 +22,7 @@ def body_id(model: mujoco.MjModel, name: str) -> int:
     """
     bodies = {body_name(model, i): i for i in range(1, model.nbody)}
     bodies |= {f"#{i}": i for i in range(1, model.nbody) if f"#{i}" not in bodies}
-    if name not in bodies:
+    if not isinstance(name, str) or name not in bodies:
         shown = ", ".join(repr(body_name(model, i)) for i in range(1, model.nbody))
         raise ModelError(f"body = {name!r}: must be one of {shown or '(the model has none)'}")
     return bodies[name]
@@ -36,7 +36,7 @@ def geom_id(model: mujoco.MjModel, name: str) -> int:
     """
     geoms = {model.geom(i).name: i for i in range(model.ngeom) if model.geom(i).name}
     geoms |= {f"#{i}": i for i in range(model.ngeom) if f"#{i}" not in geoms}
-    if name not in geoms:
+    if not isinstance(name, str) or name not in geoms:
         fixed = [i for i in range(model.ngeom) if model.body_weldid[model.geom_bodyid[i]] == 0]
         shown = ", ".join(label(model, i) for i in fixed) or "(the model has none)"
         raise ModelError(f"support = {name!r}: the model has no geom of that name; fixed ones are {shown}")

@@ -13,7 +13,7 @@ from pivoting.controller.rotations import quaternion_product
 from pivoting.controller.solution import Solution
 from pivoting.controller.solvers.solve import solve
 from pivoting.controller.uncertainty.uncertainty import Uncertainty
-from pivoting.controller.validate import array, fail
+from pivoting.controller.validate import fail, for_each
 from pivoting.controller.wrench_controller import WrenchController
 from pivoting.errors import PivotingError
 from pivoting.models.errors import ModelError
@@ -178,7 +178,7 @@ def _contact_points(found: RigidBody, contacts: Sequence[ArrayLike], radius: Arr
     if not isinstance(contacts, Sequence | np.ndarray) or len(contacts) == 0:
         raise fail("contacts", contacts, "a list of at least one point")
     points = [found.point(contact) for contact in contacts]
-    radii = array("radius", np.broadcast_to(radius, len(points)) if np.ndim(radius) == 0 else radius, (len(points),))
+    radii = for_each("radius", radius, len(points))
     if found.dim == 2 and len(points) != 1:
         raise ModelError(f"contacts = {[p.tolist() for p in points]}: must be one point for a planar body")
     return points, radii

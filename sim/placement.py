@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pivoting.controller.rotations import exponential, quaternion_product
+from pivoting.controller.validate import dimensions, fail
 from pivoting.models.errors import ModelError
 from pivoting.models.frames import matrix, quaternion
 from pivoting.models.names import label
@@ -194,6 +195,8 @@ def _arc(case: Scenario) -> Arc | None:
 
 def _in_body_frame(points: ArrayLike, frame: tuple[Array, Array]) -> ArrayLike:
     """Points (..., 3) that are given in the frame that the file gives the body; anything else as it is."""
+    if dimensions(points) < 0:
+        raise fail("contact", points, "points of three numbers each, in the body frame")
     given = np.asarray(points)
     if given.dtype.kind not in "iuf" or given.shape[-1:] != (3,):
         return points

@@ -1,9 +1,7 @@
-"""The command line as a stranger uses it: real processes, exit codes, one line for a wrong call."""
+"""The command line as a stranger uses it: exit codes, a line for a wrong call; in real processes where it matters."""
 
 import json
-import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 
@@ -11,23 +9,13 @@ import numpy as np
 import pytest
 from pivoting.sim.console.command_line import main
 
+from tests.processes import called, pivoting
+
 KEYS = {
     "scenario", "seed", "worlds", "verdict", "failed_worlds", "slip_max_m", "slip_floor_m", "angle_error_rms_deg",
     "angle_error_max_deg", "contact_lost_s", "friction_use_max", "force_mismatch_rel", "residual_max",
     "solve_us_median", "solve_us_p99", "sim_s", "wall_s",
 }  # fmt: skip
-
-
-def pivoting(*words: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "pivoting.sim", *words],
-        capture_output=True,
-        text=True,
-        cwd=cwd,
-        env={**os.environ, **environment},
-        timeout=300,
-        check=False,
-    )
 
 
 def test_example_json() -> None:
@@ -54,7 +42,7 @@ def test_example_for_people_and_its_figure(tmp_path: Path) -> None:
 
 
 def test_list() -> None:
-    done = pivoting("list")
+    done = called("list")
     assert done.returncode == 0
     names = [line.split()[0] for line in done.stdout.splitlines()]
     assert {"balance-2d", "incline-2d", "pivot-2d", "snap-2d"} <= set(names)
@@ -71,7 +59,7 @@ def test_run_json_is_one_object_and_nothing_else() -> None:
 
 
 def test_run_writes_recording_and_summary(tmp_path: Path) -> None:
-    done = pivoting("run", "snap-2d", "--out", str(tmp_path / "new" / "folder"))
+    done = called("run", "snap-2d", "--out", str(tmp_path / "new" / "folder"))
     assert done.returncode == 0, done.stderr
     assert "pass" in done.stdout
     out = tmp_path / "new" / "folder"
@@ -91,7 +79,7 @@ def test_a_failed_verdict_exits_1_and_still_tells_everything() -> None:
 
 def test_a_diverged_run_is_still_json() -> None:
     """nan is not JSON: it is written as null, and the verdict is fail."""
-    done = pivoting("run", "balance-2d", "--set", "bandwidth=5000", "--set", "seconds=1", "--json")
+    done = called("run", "balance-2d", "--set", "bandwidth=5000", "--set", "seconds=1", "--json")
     assert done.returncode == 1
     assert json.loads(done.stdout)["verdict"] == "fail"
 
@@ -133,12 +121,19 @@ def test_a_diverged_run_is_still_json() -> None:
     ],
 )
 def test_wrong_calls_are_one_line_and_exit_2(words: list[str], message: str, tmp_path: Path) -> None:
-    done = pivoting(*words, cwd=tmp_path)
+    done = called(*words, cwd=tmp_path)
     assert done.returncode == 2
     assert done.stdout == ""
     assert len(done.stderr.strip().splitlines()) == 1
     assert message in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_wrong_call_in_a_process_of_its_own() -> None:
+    """As the others; what the process adds to them is its exit code."""
+    done = pivoting("run", "fly-2d")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("pivoting: scenario = 'fly-2d'")
 
 
 def test_a_fault_of_ours_is_not_called_a_wrong_use(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -155,11 +150,11 @@ def test_a_fault_of_ours_is_not_called_a_wrong_use(monkeypatch: pytest.MonkeyPat
 
 def test_out_that_is_a_file_is_refused_before_the_run(tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("mine")
-    done = pivoting("run", "balance-2d", "--out", str(tmp_path / "taken"))
+    done = called("run", "balance-2d", "--out", str(tmp_path / "taken"))
     assert done.returncode == 2
     assert "must be a folder" in done.stderr
     assert (tmp_path / "taken").read_text() == "mine"
-    below = pivoting("run", "balance-2d", "--out", str(tmp_path / "taken" / "sub"))
+    below = called("run", "balance-2d", "--out", str(tmp_path / "taken" / "sub"))
     assert below.returncode == 2
     assert "must be a folder that can be written to" in below.stderr
 
@@ -171,7 +166,7 @@ def test_help_and_version() -> None:
 
 def test_help_of_run_lists_the_keys() -> None:
     """With unit, range, default and meaning."""
-    told = " ".join(pivoting("run", "--help").stdout.split())
+    told = " ".join(called("run", "--help").stdout.split())
     assert "--set KEY=VALUE" in told
     for words in (
         "[>= 0.1 and <= 89.9 deg; default: 80; only if reference is arc or return]",
@@ -184,14 +179,14 @@ def test_help_of_run_lists_the_keys() -> None:
 def test_limits_and_worlds_of_a_run(tmp_path: Path) -> None:
     """A limit of one's own fails some of the worlds: which, and which is recorded, is said; here is a folder."""
     words = ["run", "snap-2d", "--worlds", "12", "--set", "spread=0.05", "--out", "."]
-    free = pivoting(*words, cwd=tmp_path)
+    free = called(*words, cwd=tmp_path)
     assert free.returncode == 0, free.stderr
     errors = json.loads((tmp_path / "summary.json").read_text())
     assert errors["failed_worlds"] == []
     limit = errors["slip_max_m"] * 0.999999
     words += ["--limit", f"slip_m={limit!r}", "--record-world"]
-    assert pivoting(*words, "2", cwd=tmp_path).returncode == 1
-    held = pivoting(*words, "3", cwd=tmp_path)
+    assert called(*words, "2", cwd=tmp_path).returncode == 1
+    held = called(*words, "3", cwd=tmp_path)
     assert held.returncode == 1
     told = json.loads((tmp_path / "snap-2d-2.summary.json").read_text())
     assert told["limits"]["slip_m"] == limit
@@ -227,7 +222,7 @@ def test_an_object_of_ones_own(tmp_path: Path) -> None:
     model, out = tmp_path / "can.xml", tmp_path / "out"
     model.write_text(OWN)
     own = ["run", "pivot", "--model", str(model), "--body", "can"]
-    done = pivoting(*own, "--contact", "vertex", "--set", "seconds=0.5", "--out", str(out), "--json")
+    done = called(*own, "--contact", "vertex", "--set", "seconds=0.5", "--out", str(out), "--json")
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)
     assert summary["verdict"] == "pass"
@@ -249,7 +244,7 @@ def test_an_object_of_ones_own(tmp_path: Path) -> None:
         ([*own, "--support", "moon"], "support = 'moon'"),
         (["run", "pivot", "--model", str(tmp_path), "--body", "can"], "it is a directory"),
     ):
-        wrong = pivoting(*arguments, "--out", str(tmp_path / "other"))
+        wrong = called(*arguments, "--out", str(tmp_path / "other"))
         assert wrong.returncode == 2
         assert re.search(message, wrong.stderr), wrong.stderr
         assert len(wrong.stderr.strip().splitlines()) == 1

@@ -17,13 +17,13 @@ from pivoting.sim.pipeline.own_control import Moment
 from pivoting.sim.scenarios.scenario_file import read
 
 from tests.own_files import mjcf, own
-from tests.processes import pivoting
+from tests.processes import called, pivoting
 from tests.same_runs import assert_same
 
 CASES: dict[str, dict[str, Any]] = {
     "noise": {"name": "pivot-2d", "worlds": 9, "noise": 0.05, "integral": 5.0, "f_min": "1w", "seconds": 0.3},
     "space": {"name": "pivot-3d", "worlds": 9, "noise": 0.02, "seconds": 0.3},
-    "a horizon": {"name": "mpc-2d", "worlds": 3, "noise": 0.02, "seconds": 0.1, "limits": {"settle_s": 0.05}},
+    "a horizon": {"name": "mpc-2d", "worlds": 2, "noise": 0.02, "seconds": 0.06, "limits": {"settle_s": 0.03}},
     "released": {
         "name": "mpc-2d", "worlds": 2, "seconds": 0.3, "force_max": "0.05w", "moment_max": "0.05w", "theta_end": 40,
     },
@@ -51,14 +51,14 @@ def assert_same_measures(fleet: Fleet, run: Run) -> None:
         assert getattr(fleet.measures, name).tobytes() == values.tobytes(), name
 
 
-@pytest.mark.parametrize("size", [1, 7, None])
+@pytest.mark.parametrize("size", [1, 7])
 def test_nothing_depends_on_the_chunks(
-    size: int | None, whole: tuple[Run, dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+    size: int, whole: tuple[Run, dict[str, Any]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Measures, samples, verdict and summary are those of one run of all worlds, to the last bit."""
     run, arguments = whole
     steps = run.time.size - 1
-    monkeypatch.setattr(chunks, "CHUNK", (size or run.worlds) * steps)
+    monkeypatch.setattr(chunks, "CHUNK", size * steps)
     fleet = simulate(**arguments, keep="reduced")
     assert isinstance(fleet, Fleet)
     assert fleet.worlds == run.worlds
@@ -163,8 +163,7 @@ def test_it_cannot_be_changed_and_can_be_pickled(fleet: Fleet) -> None:
     assert again.replay(1).worlds == 1
 
 
-@pytest.mark.parametrize("keep", ["reduced", "measures"])
-@pytest.mark.parametrize("case", ["noise", "a horizon"])
+@pytest.mark.parametrize(("keep", "case"), [("reduced", "noise"), ("measures", "noise"), ("measures", "a horizon")])
 def test_what_is_loaded_is_what_was_saved(keep: str, case: str, tmp_path: Path) -> None:
     fleet = simulate(**CASES[case], keep=keep)
     assert sorted(path.name for path in fleet.save(tmp_path).iterdir()) == ["run.nc", "scenario.json"]
@@ -249,11 +248,11 @@ def test_on_the_command_line(tmp_path: Path) -> None:
     assert (tmp_path / kept["recording"]).stat().st_size > 10_000
     assert f"world {kept['worst_world']} of 5, the worst, is in" in done.stdout
     assert isinstance(load(tmp_path / kept["scenario_file"]), Fleet)
-    again = pivoting("run", "--scenario", str(tmp_path / kept["scenario_file"]), "--json")
+    again = called("run", "--scenario", str(tmp_path / kept["scenario_file"]), "--json")
     summary = json.loads(again.stdout)
     assert (again.returncode, summary["keep"]) == (1, "measures")
     assert summary["slip_max_m"] == kept["slip_max_m"]
-    refused = pivoting("run", "pivot-2d", "--keep", "nothing")
+    refused = called("run", "pivot-2d", "--keep", "nothing")
     assert (refused.returncode, refused.stdout) == (2, "")
     assert "--keep" in refused.stderr
     assert len(refused.stderr.splitlines()) == 1
@@ -262,7 +261,7 @@ def test_on_the_command_line(tmp_path: Path) -> None:
 MEMORY = """
 import resource, sys
 from pivoting import simulate
-for worlds in (150, 450):
+for worlds in (150, 350):
     simulate("pivot-2d", worlds, seconds=0.5, keep="measures")
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
@@ -270,7 +269,7 @@ for worlds in (150, 450):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="has no getrusage")
 def test_memory_does_not_grow_with_the_worlds() -> None:
-    """300 worlds more, of 1750 steps, would take 500 MB where all is kept."""
+    """200 worlds more, of 1750 steps, would take 330 MB where all is kept."""
     done = subprocess.run([sys.executable, "-c", MEMORY], capture_output=True, text=True, timeout=300, check=True)
     few, many = (int(line) / (1024 if sys.platform == "linux" else 1024**2) for line in done.stdout.split())
     grown = many - few

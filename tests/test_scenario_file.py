@@ -13,7 +13,7 @@ from pivoting.sim import SCENARIOS, Scenario, own_object, simulate
 from pivoting.sim.scenarios.scenario_file import ScenarioFile, expressible, read, written
 
 from tests.own_files import mjcf, own
-from tests.processes import pivoting
+from tests.processes import called
 
 MUG = own_object("/somewhere/mug.xml", "mug", "vertex")
 CASES = [
@@ -105,7 +105,7 @@ def test_what_is_wrong_is_named_with_the_file(text: str, told: str, tmp_path: Pa
 
 
 def run(*words: str, cwd: Path) -> dict[str, Any]:
-    done = pivoting("run", *words, "--json", cwd=cwd)
+    done = called("run", *words, "--json", cwd=cwd)
     assert done.returncode in (0, 1), done.stderr
     return dict(json.loads(done.stdout))
 
@@ -133,7 +133,7 @@ def test_a_kept_run_is_run_again_to_the_same_arrays(words: list[str], tmp_path: 
     for name in ("changes", "limits", "seed", "worlds", "verdict", "scenario_file"):
         assert told[name] == again[name], name
     files = sorted(path.name for path in (tmp_path / "out").iterdir())
-    done = pivoting("run", "--scenario", str(file), "--out", "out", cwd=tmp_path)
+    done = called("run", "--scenario", str(file), "--out", "out", cwd=tmp_path)
     assert f"replaced out/{told['scenario_file'].removesuffix('.scenario.json')}.summary.json" in done.stdout
     assert files == sorted(path.name for path in (tmp_path / "out").iterdir())
 
@@ -160,13 +160,13 @@ def test_a_model_that_has_changed_since_is_said(tmp_path: Path) -> None:
     """It may be what is wanted; but the arrays are others."""
     simulate(own(tmp_path, mjcf())).save(tmp_path)
     (tmp_path / "own.xml").write_text(mjcf().replace(".05 .04 .06", ".05 .04 .0601"))
-    done = pivoting("run", "--scenario", "scenario.json", cwd=tmp_path)
+    done = called("run", "--scenario", "scenario.json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stderr.startswith("pivoting: scenario.json: it was written of a run with the digest ")
     assert "the model has changed" in done.stderr
     same = own(tmp_path, mjcf())
     assert same.path.exists()
-    assert pivoting("run", "--scenario", "scenario.json", cwd=tmp_path).stderr == ""
+    assert called("run", "--scenario", "scenario.json", cwd=tmp_path).stderr == ""
 
 
 def test_wrong_calls_are_one_line_and_exit_2(tmp_path: Path) -> None:
@@ -185,7 +185,7 @@ def test_wrong_calls_are_one_line_and_exit_2(tmp_path: Path) -> None:
         (["--scenario", "none.json"], "worlds = 0: must be a whole number >= 1"),
         (["--scenario", "scenario.json"], "scenario.json: cannot be run again: Python objects, which no file holds"),
     ):
-        done = pivoting("run", *words, "--out", "out", cwd=tmp_path)
+        done = called("run", *words, "--out", "out", cwd=tmp_path)
         assert (done.returncode, done.stdout) == (2, ""), words
         assert told in done.stderr
         assert len(done.stderr.strip().splitlines()) == 1

@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+import distributed
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
@@ -152,7 +153,6 @@ def test_the_command(swept: Swept, tmp_path: Path) -> None:
 
 
 def test_two_workers_of_dask_of_which_one_is_killed(swept: Swept) -> None:
-    distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
         killed: list[int] = []
 
@@ -170,7 +170,6 @@ def test_two_workers_of_dask_of_which_one_is_killed(swept: Swept) -> None:
 
 
 def test_sensitivities_find_what_matters(swept: Swept) -> None:
-    pytest.importorskip("SALib")
     rows = {name: np.resize(values, 500) for name, values in swept.rows.items()}
     rng = np.random.default_rng(0)
     rows |= {key: rng.uniform(size=500) for key in swept.keys}

@@ -6,6 +6,7 @@ Also where nothing can be written, as in a container: neither in the installatio
 import ctypes
 import json
 import os
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -17,6 +18,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 SHORT = "run", "balance-2d", "--set", "seconds=1", "--json"
+COMPILING = "pivoting: compiling what such runs need, once"
 MEMORY = (
     "pivoting: compiling in memory, in every run: no folder for a cache can be written to; NUMBA_CACHE_DIR sets one"
 )
@@ -48,23 +50,6 @@ def test_everything_is_in_it(wheel: Path) -> None:
             if path.suffix in (".py", ".xml", ".typed"):
                 assert f"pivoting/{room}{path.relative_to(ROOT / folder)}" in names
     assert not [name for name in names if not name.startswith("pivoting")]
-
-
-def test_installed_elsewhere_it_runs_the_pivot(site: Path, tmp_path: Path) -> None:
-    environment = {**os.environ, "PYTHONPATH": str(site)}
-    where = [sys.executable, "-c", "import pivoting, pivoting.sim; print(pivoting.__path__, pivoting.sim.__file__)"]
-    found = subprocess.run(where, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
-    assert found.stdout == f"['{site}/pivoting'] {site}/pivoting/sim/__init__.py\n"
-    done = subprocess.run(
-        [sys.executable, str(site / "bin" / "pivoting"), "run", "pivot-2d", "--json"],
-        cwd=tmp_path,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["verdict"] == "pass"
 
 
 def bound_by_permissions() -> None:
@@ -122,27 +107,58 @@ def test_where_nothing_can_be_written_it_compiles_in_memory_and_says_so(
     assert all("out/balance-2d" in line for line in wrote)
 
 
-def test_the_variable_that_is_named_sets_a_place(read_only: dict[str, str], tmp_path: Path) -> None:
-    place = tmp_path / "place"
-    first = run({**read_only, "NUMBA_CACHE_DIR": str(place)}, *SHORT, cwd=tmp_path)
-    again = run({**read_only, "NUMBA_CACHE_DIR": str(place)}, *SHORT, cwd=tmp_path)
-    assert json.loads(first.stdout)["verdict"] == "pass"
-    assert first.stderr.startswith("pivoting: compiling what such runs need, once")
-    assert f"{place}/" in first.stderr
+@pytest.fixture(scope="module")
+def kernels(site: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What an installation elsewhere compiles for the pivot, in the place that NUMBA_CACHE_DIR names."""
+    place, cwd = tmp_path_factory.mktemp("place"), tmp_path_factory.mktemp("cwd")
+    environment = {**os.environ, "PYTHONPATH": str(site), "NUMBA_CACHE_DIR": str(place)}
+    where = [sys.executable, "-c", "import pivoting, pivoting.sim; print(pivoting.__path__, pivoting.sim.__file__)"]
+    found = subprocess.run(where, cwd=cwd, env=environment, capture_output=True, text=True, check=True)
+    assert found.stdout == f"['{site}/pivoting'] {site}/pivoting/sim/__init__.py\n"
+    command = [sys.executable, str(site / "bin" / "pivoting"), "run", "pivot-2d", "--json"]
+    done = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["verdict"] == "pass"
+    assert done.stderr.startswith(COMPILING)
+    assert f"{place}/" in done.stderr
+    return place
+
+
+def test_the_variable_that_is_named_sets_a_place(kernels: Path, read_only: dict[str, str], tmp_path: Path) -> None:
+    """Installed elsewhere it runs the pivot, and compiles into that place; what is there is not compiled again."""
+    again = run({**read_only, "NUMBA_CACHE_DIR": str(kernels)}, *SHORT, cwd=tmp_path)
+    assert json.loads(again.stdout)["verdict"] == "pass"
     assert again.stderr == ""
 
 
-def test_a_home_alone_will_do(read_only: dict[str, str], tmp_path: Path) -> None:
-    """And kernels that are kept there are dropped when the sources change, as everywhere."""
+def test_a_home_alone_will_do(kernels: Path, read_only: dict[str, str], tmp_path: Path) -> None:
+    """It is written to and read; and kernels that are kept there are dropped when the sources change."""
     home = tmp_path / "other"
     home.mkdir()
-    for expected in ("pivoting: compiling what such runs need, once", ""):
-        done = run({**read_only, "HOME": str(home)}, *SHORT, cwd=tmp_path)
-        assert done.returncode == 0, done.stderr
-        assert done.stderr.startswith(expected)
-        assert str(home) in done.stderr or not expected
+    environment = {**read_only, "HOME": str(home)}
+    code = "from pivoting.controller.kernels.compilation import CACHE, kernel; print(CACHE)"
+    where = subprocess.run(
+        [sys.executable, "-c", code], env=environment, cwd=tmp_path, preexec_fn=bound_by_permissions,
+        capture_output=True, text=True, check=True,
+    ).stdout  # fmt: skip
+    cache = Path(where.strip())
+    assert cache.is_relative_to(home)
+    shutil.copytree(kernels, cache.parent, dirs_exist_ok=True)
+    done = run(environment, *SHORT, cwd=tmp_path)
+    assert json.loads(done.stdout)["verdict"] == "pass"
+    assert done.stderr == ""
     kept = sorted(home.rglob("kernels.sha256"))
     assert {path.parent.name.split("_")[0] for path in kept} >= {"controller", "kernels", "sim"}
     for path in kept:
         path.write_text("other sources")
-    assert run({**read_only, "HOME": str(home)}, *SHORT, cwd=tmp_path).stderr.startswith("pivoting: compiling what")
+    process = subprocess.Popen(
+        [sys.executable, "-m", "pivoting", *SHORT], env=environment, cwd=tmp_path, preexec_fn=bound_by_permissions,
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    with process:
+        assert process.stderr is not None
+        told = process.stderr.readline()
+        process.kill()
+    assert told.startswith(COMPILING)
+    assert str(home) in told
+    assert not list(cache.glob("*.nb[ic]"))

@@ -71,6 +71,8 @@ def methods() -> tuple[str, ...]:
 
 def _edges(problem: WrenchProblem, method: str, options: dict[str, Any]) -> int:
     """Edges of the pyramids that this method solves for in place of the cones; 0 if it solves for the cones."""
+    if not isinstance(method, str):
+        raise fail("method", method, "text")
     if not method.startswith("qp:"):
         if "edges" in options:
             raise fail("options", options, f'without "edges": {method} needs no pyramids')

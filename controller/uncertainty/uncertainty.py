@@ -7,7 +7,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pivoting.controller.validate import Array, array, fail, frozen, number, one_of
+from pivoting.controller.validate import Array, array, dimensions, fail, frozen, number, one_of
 
 SHOVE_SECONDS = 0.05  # over which a shove is spread, unless it is said otherwise [s]
 DISTURBANCES = ("shove", "theta", "omega")  # intervals about 0
@@ -188,7 +188,7 @@ def _positive(name: str, value: ArrayLike, unit: str) -> Interval:
 
 def _about_zero(name: str, value: ArrayLike) -> Interval:
     """An interval with 0 in it; a number stands for the greatest deviation either way."""
-    if np.ndim(value) == 0:
+    if dimensions(value) == 0:
         most = number(name, value, at_least=0.0)  # type: ignore[arg-type]
         return Interval(-most, most)
     interval = _interval(name, value)
@@ -199,16 +199,18 @@ def _about_zero(name: str, value: ArrayLike) -> Interval:
 
 def _box(value: ArrayLike, dim: int | None) -> Array:
     """(d, 2) of one interval for all axes, or one for each."""
-    if np.ndim(value) == 2:
-        return frozen(np.array([_about_zero("com", row) for row in array("com", value, (dim, 2))]))
-    if dim not in (2, 3):
+    box = dimensions(value) == 2
+    if not (isinstance(dim, int | np.integer) and dim in (2, 3)) and not (box and dim is None):
         raise fail("dim", dim, "2 or 3, where com is one interval for all axes")
+    if box:
+        return frozen(np.array([_about_zero("com", row) for row in array("com", value, (dim, 2))]))
+    assert dim is not None
     return frozen(np.array([_about_zero("com", value)] * dim))
 
 
 def _interval(name: str, value: ArrayLike) -> Interval:
     """An interval, or a number as one of no width."""
-    if np.ndim(value) == 0:
+    if dimensions(value) == 0:
         only = number(name, value)  # type: ignore[arg-type]
         return Interval(only, only)
     low, high = array(name, value, (2,)).tolist()

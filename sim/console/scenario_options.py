@@ -56,7 +56,7 @@ def pairs(option: str, given: tuple[str, ...]) -> dict[str, str]:
     out: dict[str, str] = {}
     for pair in given:
         key, equals, value = pair.partition("=")
-        if not equals or not key or not value:
+        if not equals or not key or not value or not pair.isprintable():
             raise click.BadParameter(f"{option} {pair!r}: must be KEY=VALUE")
         if key in out:
             raise click.BadParameter(f"{option} {pair!r}: {key} is already given as {out[key]}")

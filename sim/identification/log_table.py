@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from pivoting.controller.learning.motion_log import CONTACT as CONTACT_WORDS
-from pivoting.controller.validate import Array, InputError
+from pivoting.controller.validate import Array, InputError, in_one_line, shown
 from pivoting.sim.identification.log_columns import CONTACT, Column
 
 ENDINGS = (".csv", ".parquet")
@@ -95,12 +95,12 @@ class LogTable:
             try:
                 found[row] = float("nan" if value is None or value == "" else value)
             except (TypeError, ValueError):
-                raise InputError(f"{self.path}: row {row + 1} of {name} is {value!r}; must be a number") from None
+                raise InputError(f"{self.path}: row {row + 1} of {name} is {shown(value)}; must be a number") from None
         return found
 
 
 def _listed(names: tuple[str, ...]) -> str:
-    return ", ".join(names) if len(names) <= 24 else ", ".join(names[:24]) + ", ..."
+    return ", ".join(map(in_one_line, names[:24])) + ", ..." * (len(names) > 24)
 
 
 def _read_csv(path: Path) -> dict[str, list[str]]:

@@ -70,6 +70,7 @@ def table_log(
         if table.has(columns[name]) and (rates or name != "angular_velocity"):
             last = table.rows - 1 if name == "contact_force" else table.rows
             found[name] = table.values(columns[name], rows=last, gaps=gaps)
+    table.need(TIME)
     seen = table.values(orientation)
     if not planar:
         seen = _normalised(table, seen)

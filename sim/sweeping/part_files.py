@@ -5,7 +5,8 @@ Each file appears whole, so that a sweep that is killed loses the chunk under wa
 
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,8 @@ from pivoting.controller.validate import InputError
 from pivoting.sim.sweeping.chunk_task import Rows
 from pivoting.sim.whole_files import whole
 
+WHOLE = "the file of a sweep, whole"
+_PART = "a chunk of a sweep, whole: remove it and resume"
 _PLAN, _KEY = "plan.json", b"pivoting"
 
 
@@ -37,7 +40,9 @@ class PartFiles:
         self._plan = json.loads(json.dumps(plan))
         begun = self._folder / _PLAN
         if begun.exists() and any(self._folder.glob("part-*.parquet")):
-            _refuse_another(begun, json.loads(begun.read_text(encoding="utf-8")), self._plan, resume)
+            with refused_unless(begun, "the plan of a sweep, whole: remove its folder"):
+                then = dict(json.loads(begun.read_text(encoding="utf-8")))
+            _refuse_another(begun, then, self._plan, resume)
             return
         if resume and out.exists():
             _refuse_another(out, plan_of(out), self._plan, resume)
@@ -67,10 +72,15 @@ class PartFiles:
 
     def join(self, chunks: int) -> None:
         """Make one file of all of them, in their order, and remove them."""
-        schema = parquet.read_schema(self._path(0)).with_metadata({_KEY: json.dumps(self._plan)})
+        with refused_unless(self._path(0), _PART):
+            schema = parquet.read_schema(self._path(0)).with_metadata({_KEY: json.dumps(self._plan)})
         with whole(self._out) as part, parquet.ParquetWriter(part, schema) as writer:
             for chunk in range(chunks):
-                writer.write_table(parquet.read_table(self._path(chunk)).replace_schema_metadata(schema.metadata))
+                with refused_unless(self._path(chunk), _PART):
+                    rows = parquet.read_table(self._path(chunk)).replace_schema_metadata(schema.metadata)
+                    if not rows.schema.equals(schema):
+                        raise ValueError("its columns are others")
+                writer.write_table(rows)
         shutil.rmtree(self._folder)
 
     def _path(self, chunk: int) -> Path:
@@ -83,15 +93,27 @@ def plan_of(path: Path) -> dict[str, Any]:
     Raises:
         ValueError: it is no file of a sweep.
     """
-    try:
+    with refused_unless(path, WHOLE):
         return dict(json.loads(parquet.read_schema(path).metadata[_KEY]))
-    except (KeyError, TypeError, ValueError, OSError, pyarrow.ArrowException) as error:
-        raise InputError(f"{path}: must be the file of a sweep, whole ({' '.join(str(error).split())})") from None
 
 
 def rows_in(path: Path) -> Rows:
-    """All rows of a sweep that has come to its end, by column."""
-    return {name: values.to_numpy() for name, values in zip(*_columns(path), strict=True)}
+    """All rows of a sweep that has come to its end, by column.
+
+    Raises:
+        ValueError: the file is not whole.
+    """
+    with refused_unless(path, WHOLE):
+        return {name: values.to_numpy() for name, values in zip(*_columns(path), strict=True)}
+
+
+@contextmanager
+def refused_unless(path: Path, what: str) -> Iterator[None]:
+    """What is raised of a file that is not `what` it should be becomes one error, which names it."""
+    try:
+        yield
+    except (LookupError, TypeError, ValueError, OSError, pyarrow.ArrowException) as error:
+        raise InputError(f"{path}: must be {what} ({' '.join(str(error).split())})") from None
 
 
 def _columns(path: Path) -> tuple[list[str], list[Any]]:
@@ -100,7 +122,8 @@ def _columns(path: Path) -> tuple[list[str], list[Any]]:
 
 
 def _column(path: Path, name: str) -> Any:
-    return parquet.read_table(path, columns=[name]).column(name).to_numpy()
+    with refused_unless(path, _PART):
+        return parquet.read_table(path, columns=[name]).column(name).to_numpy()
 
 
 def _refuse_another(where: Path, then: Mapping[str, Any], now: Mapping[str, Any], resume: bool) -> None:

@@ -17,7 +17,7 @@ from pivoting.sim.scenarios.scenario import Scenario
 from pivoting.sim.scenarios.scenario_file import ScenarioFile, described, expressible, written
 from pivoting.sim.scenarios.shipped_scenarios import scenario
 from pivoting.sim.sweeping.chunk_task import ChunkTask, Rows, run_chunk
-from pivoting.sim.sweeping.part_files import PartFiles, plan_of, rows_in
+from pivoting.sim.sweeping.part_files import WHOLE, PartFiles, plan_of, refused_unless, rows_in
 from pivoting.sim.sweeping.sampling import SAMPLING, sampled_values
 from pivoting.sim.sweeping.swept import Swept
 
@@ -119,8 +119,9 @@ def read_sweep(path: Path | str) -> Swept:
         ValueError: it is no file of a sweep.
     """
     plan = plan_of(Path(path))
-    file = described(json.loads(plan["scenario"]), Path(path).parent)
-    return Swept(file.scenario, file.seed, plan["sampling"], rows_in(Path(path)))
+    with refused_unless(Path(path), WHOLE):
+        file, sampling = described(json.loads(plan["scenario"]), Path(path).parent), plan["sampling"]
+    return Swept(file.scenario, file.seed, sampling, rows_in(Path(path)))
 
 
 def _intervals(vary: Mapping[str, Any]) -> dict[str, Any]:
