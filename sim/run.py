@@ -45,8 +45,7 @@ class Run(ContactMotion):
     def summary(self) -> dict[str, Any]:
         """The run in numbers, of the worst world, SI units in the keys; what `--json` prints."""
         played = {} if self.plan is None else {"plan_angle_error_max_deg": float(np.rad2deg(self.plan_error.max()))}
-        margins = {} if self.margins is None else self.margins.figures()
-        return {**super().summary(), **played, **margins}
+        return {**super().summary(), **played}
 
     @cached_property
     def margins(self) -> MarginsOverTime | None:

@@ -47,7 +47,6 @@ def print_run(console: Console, run: Run | Fleet) -> None:
     _print_scenario(console, run, summary)
     console.print(_verdict_table(run, summary))
     _print_verdict(console, run, summary)
-    _print_margins(console, summary)
     _print_times(console, run, summary)
     _print_notes(console, run, summary)
 
@@ -102,21 +101,6 @@ def _print_verdict(console: Console, run: Experiment, summary: Mapping[str, Any]
             + f"; those that fail are {some}" * bool(failed)
         )
         console.print(line, highlight=False)
-
-
-def _print_margins(console: Console, summary: Mapping[str, Any]) -> None:
-    """How well the wrenches of the worst world held the set of its controller, where it has one."""
-    if "slack_min_N" not in summary:
-        return
-    slack, share = (round(value, 9) + 0.0 for value in (summary["slack_min_N"], 100.0 * summary["share_min"]))
-    console.print(
-        f"grip of the set's worst member: slack {_short(slack)} N at least, {_short(share)} % of f_n;"
-        f" the wrench holds the set at a scale of {summary['wrench_scale_min']:.3g} at least;"
-        f" price, median: {_short(summary['price_objective_median'])} times the objective,"
-        f" {_short(summary['price_median'])} times the wrench",
-        soft_wrap=True,
-        highlight=False,
-    )
 
 
 def _print_times(console: Console, run: Run | Fleet, summary: Mapping[str, Any]) -> None:
