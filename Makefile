@@ -9,8 +9,7 @@ TESTS := -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 UV := .venv-lock/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
 	--custom-compile-command "make lock"
 
-.PHONY: help demo test check docs latest bench evidence fuzz kills guarantee sweeps learning study engines objects figures \
-	lock clean
+.PHONY: help demo test check docs latest bench evidence fuzz kills guarantee sweeps learning study engines objects figures lock clean
 
 demo: $(STAMP)  ## the worked example, a block pivoted in MuJoCo, its verdict, a recording and a picture in out/
 	@mkdir -p out

