@@ -46,7 +46,8 @@ def slack_bounds(
     """Bounds on the least slack f_n - |f_t| / mu and f_n - f_min [N] of all worlds of a controller's set.
 
     Pushes and errors of the measured state are bounded by their norms, which `low` counts in full; where orientation
-    may be off, slacks are those of the cones that this narrows, as in `Margins.slack`. A `low` of at least 0 proves that the contact holds in every world of the set; a `high` below 0, that there is one in which it does not.
+    may be off, slacks are those of the cones that this narrows, as in `Margins.slack`. A `low` of at least 0 proves
+    that the contact holds in every world of the set; a `high` below 0, that there is one in which it does not.
 
     Args:
         state: as it is measured.  wrench: (nw,) object axes, at the believed CoM, such as that of the `Solution`.
