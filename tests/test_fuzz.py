@@ -1,11 +1,11 @@
-"""Every public entry with hostile input, in a few hundred examples; `make fuzz` tries 50,000."""
+"""Every public entry with hostile input, in a hundred examples; `make fuzz` tries 50,000."""
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 
 from tests.fuzzed_entries import Entry, documented, entries
 
-EXAMPLES = 250
+EXAMPLES = 125
 NAMES = ("solve", "controller", "uncertainty", "keys", "scenario file", "log in CSV", "attach", "vary", "contact",
          "model", "saved run", "log in Parquet", "recording", "sweep's file", "simulate")  # fmt: skip
 
