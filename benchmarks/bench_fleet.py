@@ -4,7 +4,7 @@ The open loop plays a run's own wrenches back from its own start, which ends in 
 share is that of the open loop's world-steps which the closed loop makes in the same time: the median over pairs.
 """
 
-from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,7 @@ def measure(quick: bool) -> dict[str, float]:
     """The figures; see the head of this file."""
     figures = {}
     for name, (scenario, keys, _) in FLEETS.items():
-        again: Callable[[], Any] = lambda scenario=scenario, keys=keys: simulate(scenario, WORLDS, **keys)  # noqa: E731
+        again = partial(simulate, scenario, WORLDS, **keys)
         again()  # compiled and warm before anything is timed
         pairs = []
         for _ in range(3 if quick else 9):

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from pivoting.controller.cone_constraints import ConeConstraints, friction_limits, wrench_limits
+from pivoting.controller.cone_constraints import ConeConstraints, cone_slack, friction_limits, wrench_limits
 from pivoting.controller.kernels.compilation import kernel
 from pivoting.controller.mobility import free_axes
 from pivoting.controller.plane_and_space import component
@@ -86,6 +86,7 @@ class BoundedSolver:
         self._axes = free_axes(belief.contacts.points, belief.contacts.pivot, belief.source.map)
         A, of_set = len(self._axes), float(belief.unknown is not None)
         self._nominal = self._unmoved()
+        self._flat = self._slopes(self._nominal)
         own = self._own(*self._nominal[:2])
         bound = self._bounds = wrench_limits(bounds, nw, 0, self._scale, dt)
         wide = n + nw + A + nw + 2
@@ -191,9 +192,7 @@ class BoundedSolver:
 
     def _slack(self, force: Array, apex: Array, floors: Array) -> float:
         """How far forces (K, d) are from the edges of the cones and from the floors, along the normals, in weights."""
-        above = force - apex
-        along = np.linalg.norm(above[..., :-1], axis=-1) / self._belief.contacts.mu
-        return float(min((above[..., -1] - along).min(), (force[:, -1] - floors).min())) / self._unit
+        return cone_slack(force, apex, self._belief.contacts.mu, floors) / self._unit
 
     def _weights(self, wide: int, f: Indices, w: Indices) -> Sparse:
         """P, of the forces and the wrench in their units."""
@@ -213,7 +212,8 @@ class BoundedSolver:
         b, own = self._sides.copy(), self._own(*cones[:2])
         b[:nw], b[self._linear], b[self._cone] = required / self._scale, own.linear_side, own.cone_side
         self._bounds.place(b, self._first, None if before is None else np.asarray(before, dtype=float) / self._scale)
-        filled = self._A.filled((scaled[None], turning[None], *self._slopes(cones)))
+        slopes = self._flat if cones is self._nominal else self._slopes(cones)
+        filled = self._A.filled((scaled[None], turning[None], *slopes))
         answer = self._solve(ConicProgram(self._P, self._q, filled, b, self._cones))
         force, wrench = answer.x[:n] * self._unit, answer.x[n : n + nw] * self._scale
         a, s = np.split(answer.x[n + nw : n + nw + A + nw], [A])

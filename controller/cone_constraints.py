@@ -118,3 +118,14 @@ def wrench_limits(bounds: WrenchBounds, nw: int, edges: int, unit: Array, h: flo
         np.reshape(cone, (-1, nw)), np.array(sides[1]), np.array(rates[1], dtype=bool), tuple(orders),
         bounds.rated,
     )  # fmt: skip
+
+
+def cone_slack(force: Array, apex: Array, mu: Array, floors: Array) -> float:
+    """The least of f_n - |f_t| / mu and f_n - f_min of contact forces (K, d), all along the normals [N].
+
+    Args:
+        apex: (V, K, d) from which the forces count in each of the cones.  mu: (K,).  floors: (K,), from 0 [N].
+    """
+    above = force - apex
+    along = np.linalg.norm(above[..., :-1], axis=-1) / mu
+    return float(min((above[..., -1] - along).min(), (force[:, -1] - floors).min()))

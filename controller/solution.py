@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
+from pivoting.controller.cone_constraints import cone_slack
 from pivoting.controller.errors import SolveError
 from pivoting.controller.validate import Array, frozen
 from pivoting.controller.wrench_problem import WrenchProblem
@@ -56,9 +57,7 @@ class Solution:
         uncertain object, this is the slack of the worst member, as the guarantee counts it, of two contacts with the
         squeeze of this answer. `WrenchController.margins` tells more, and of any wrench.
         """
-        moved, problem = self.force - self.problem.apex, self.problem
-        above = moved[..., -1] - np.linalg.norm(moved[..., :-1], axis=-1) / problem.mu_planned
-        return float(min(above.min(), (self.force[:, -1] - problem.f_min).min()))
+        return cone_slack(self.force, self.problem.apex, self.problem.mu_planned, self.problem.f_min)
 
     @property
     def share(self) -> float:

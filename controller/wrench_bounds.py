@@ -67,6 +67,11 @@ class WrenchBounds:
         object.__setattr__(self, "component", each)
 
     @property
+    def without_rates(self) -> "WrenchBounds":
+        """The same, with no bounds on rates of change."""
+        return WrenchBounds(self.force, self.moment, self.component)
+
+    @property
     def any(self) -> bool:
         """Whether anything is bounded."""
         given = [np.min(value) for value in vars(self).values() if value is not None]

@@ -76,7 +76,7 @@ class ReferenceCheck:
     @property
     def bounded(self) -> bool:
         """Whether anything but a rate is bounded."""
-        return still(self.bounds).any
+        return self.bounds.without_rates.any
 
     @property
     def answer(self) -> str:
@@ -133,11 +133,6 @@ class ReferenceCheck:
         if self.scale_at is not None:
             said |= {"time_s": self.scale_at.time, "theta_deg": float(np.rad2deg(self.scale_at.theta))}
         return said
-
-
-def still(bounds: WrenchBounds) -> WrenchBounds:
-    """The same without bounds on rates."""
-    return WrenchBounds(bounds.force, bounds.moment, bounds.component)
 
 
 def sizes(moment: CheckedMoment) -> dict[str, float]:
@@ -218,7 +213,7 @@ class _Check:
         stance = begun.belief.stances[0]
         self.controller: WrenchController = stance.controllers[0]
         self._begun, self._unit, self._drag = begun, begun.world.unit, known_drag(begun, stance)
-        self._bounds = still(begun.bounds)
+        self._bounds = begun.bounds.without_rates
         self._solver = BoundedSolver(self.controller, self._bounds, begun.world.dt)
         self.least_scale = FeasibleScale(np.inf, np.inf, "nothing", None)
         self.least_at: int | None = None

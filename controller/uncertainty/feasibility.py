@@ -80,9 +80,7 @@ def feasibility(problem: WrenchProblem, bounds: WrenchBounds) -> Feasibility:
     last = stated.cones.zero + stated.cones.linear
     y = _in_dual_cone(np.delete(answer.z, last), stated.cones)
     y[:nw] = -(stated.A[nw:, n:].T @ y[nw:])  # A'y is 0 in the columns of w, to the last bit
-    certificate = FarkasCertificate(
-        y, stated.A, stated.b, stated.cones, stated.radius, stated.limit, stated.force, stated.length
-    )
+    certificate = FarkasCertificate(y, *stated)
     if certificate.holds():
         return Feasibility(NO, margin, certificate=certificate)
     return Feasibility(UNDECIDED, margin)
@@ -97,7 +95,7 @@ def _state(problem: WrenchProblem, bounds: WrenchBounds) -> _Stated:
     unit = force * np.array([1.0] * dim + [length] * (nw - dim))
     J, b = problem.jacobian * force / unit[:, None], problem.required / unit
     apex, floors, mu = problem.apex / force, problem.f_min / force, problem.mu_planned
-    still = WrenchBounds(bounds.force, bounds.moment, bounds.component)
+    still = bounds.without_rates
     own, bound = friction_limits(mu, floors, dim, 0, apex), wrench_limits(still, nw, 0, unit, 1.0)
     sizes, limited = greatest_size(J, b, mu, apex, still, unit)
     normals = np.eye(K * dim)[dim - 1 :: dim] if limited else np.zeros((0, K * dim))

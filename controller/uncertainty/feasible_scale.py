@@ -59,7 +59,7 @@ def feasible_scale(
     if known is None:
         raise fail("controller", "one without uncertainty", "one with a set")
     number("at_least", at_least, at_least=0.0)
-    still = WrenchBounds(bounds.force, bounds.moment, bounds.component)
+    still = bounds.without_rates
     if not still.any:
         return FeasibleScale(np.inf, np.inf, "nothing", None)
 
