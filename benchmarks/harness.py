@@ -4,7 +4,7 @@ import argparse
 import json
 import os
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from math import isnan
@@ -64,7 +64,7 @@ def peer_table(figures: dict[str, float], name: str, columns: dict[str, str]) ->
 
 def main(
     description: str,
-    measure: Callable[[bool], dict[str, float]],
+    measure: Callable[[bool], dict[str, float] | Iterator[dict[str, float]]],
     bounds: dict[str, float],
     *,
     floors: dict[str, float] | None = None,
@@ -76,7 +76,8 @@ def main(
 
     Args:
         description: what it measures.
-        measure: called with True for a quick run; gives its figures by name.
+        measure: called with True for a quick run; gives its figures by name, all at once or in parts that are saved
+            as they come.
         bounds: greatest value of a figure that is asked for; the exit code is 1 if one is exceeded.
         floors: least value of a figure that is asked for; likewise.
         markdown: renders the figures of a saved run, for `--markdown FILE`.
@@ -104,7 +105,12 @@ def main(
         print(markdown(_figures(parser, "--markdown", args.markdown)))
         return
     saved = {} if args.compare is None else _figures(parser, "--compare", args.compare)
-    figures = measure(args.quick)
+    measured, figures = measure(args.quick), dict[str, float]()
+    for part in [measured] if isinstance(measured, dict) else measured:
+        figures |= part
+        if args.json is not None:
+            result = {"figures": figures, "bounds": bounds, "floors": floors, "quick": args.quick, "machine": machine()}
+            args.json.write_text(json.dumps(result, indent=1) + "\n")
     width = max(len(name) for name in figures if brief(name))
     print(f"{'':{width}}  {'now':>10}" + (f"  {'saved':>10}" if saved else "") + "   asked")
     for name, value in figures.items():
@@ -118,9 +124,6 @@ def main(
         if name in floors:
             row += f"   >= {floors[name]:g}" + ("" if value >= floors[name] else "  MISSED")
         print(row)
-    if args.json is not None:
-        result = {"figures": figures, "bounds": bounds, "floors": floors, "quick": args.quick, "machine": machine()}
-        args.json.write_text(json.dumps(result, indent=1) + "\n")
     exceeded = any(figures[name] > bound for name, bound in bounds.items())
     raise SystemExit(exceeded or any(figures[name] < floor for name, floor in floors.items()))
 
