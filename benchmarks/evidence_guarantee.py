@@ -14,6 +14,7 @@ from pivoting.controller import ClarabelWorkspace, WrenchController, solve
 from pivoting.controller.belief import for_worlds
 from pivoting.controller.kernels.compiled_step import step_worlds
 from pivoting.controller.uncertainty.worst_case import worst_case
+from pivoting.controller.validate import frozen
 from pivoting.sim import simulate
 from rich.progress import track
 
@@ -91,7 +92,7 @@ def cost(kind: str, rounds: int) -> dict[str, float]:
         }
         controller, state, wanted = make[kind]()
         q, omega, _ = controller.space.lift_motion(state)
-        states = np.tile(np.concatenate([np.zeros(3), q, np.zeros(3), omega]), (WORLDS, 1))
+        states = frozen(np.tile(np.concatenate([np.zeros(3), q, np.zeros(3), omega]), (WORLDS, 1)))  # as in the loop
         desired = np.concatenate(controller.space.lift_motion(wanted))[None]
         plain = WrenchController(
             controller.body, controller.contacts, controller.law, controller.gravity, margin=controller.margin

@@ -144,7 +144,7 @@ class BoundedSolver:
             external: (nw,) the known wrench besides, object axes, that was subtracted in `required`; None: none.
         """
         turning = np.empty((len(self._scale), len(self._axes)))
-        _fill_turning(self._axes, np.array(orientation), self._belief, self._scale, np.empty((3, 3)), turning)
+        _fill_turning(self._axes, np.array(orientation), self._belief[:3], self._scale, np.empty((3, 3)), turning)
         problem = orientation, required, before, turning
         if self._belief.unknown is None:
             return self._solved(*problem, self._nominal)[0]
@@ -232,8 +232,10 @@ def _fill_turning(axes, q, belief, scale, R, out):  # type: ignore[no-untyped-de
 
     Args:
         axes: (A, 3) object axes.  q: (4,) object axes to world.  R: (3, 3) scratch.
+        belief: the first three values of a `Belief`.
     """
-    p, o, inertia = belief.contacts.pivot, belief.contacts.offset, belief.object.inertia
+    moved, held, source = belief
+    p, o, m, inertia = held.pivot, held.offset, moved.mass, moved.inertia
     fill_rotation(q, R)
     o0, o1, o2 = into(R, o[0], o[1], o[2])
     most = 1e-300
@@ -243,9 +245,8 @@ def _fill_turning(axes, q, belief, scale, R, out):  # type: ignore[no-untyped-de
         M0 = -(inertia[0, 0] * a0 + inertia[0, 1] * a1 + inertia[0, 2] * a2)
         M1 = -(inertia[1, 0] * a0 + inertia[1, 1] * a1 + inertia[1, 2] * a2)
         M2 = -(inertia[2, 0] * a0 + inertia[2, 1] * a1 + inertia[2, 2] * a2)
-        m = belief.object.mass
         for row in range(out.shape[0]):
-            out[row, j] = component(belief.source.map, row, m * F0, m * F1, m * F2, M0, M1, M2) / scale[row]
+            out[row, j] = component(source.map, row, m * F0, m * F1, m * F2, M0, M1, M2) / scale[row]
             most = max(most, abs(out[row, j]))
     for row in range(out.shape[0]):
         for j in range(out.shape[1]):

@@ -63,5 +63,5 @@ class Lowering:
             The wrench, and the required wrench (nw,) that it makes together with the contact forces `force`.
         """
         q, now, still = np.array(orientation), np.array(omega), np.zeros(3)
-        state_problem(self._belief, q, now, q, self.rate(q, blind), still, self._R, self._J, self._required)
+        state_problem(self._belief[:4], q, now, q, self.rate(q, blind), still, self._R, self._J, self._required)
         return self._required - self._J @ self.force.ravel(), self._required.copy()

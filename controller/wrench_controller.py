@@ -127,7 +127,8 @@ class WrenchController:
             force_map=np.ascontiguousarray(here.force_map),
             Q_f=np.array(self.Q_f),
         )
-        moved = BelievedObject(float(self.body.mass), here.lift_inertia(self.body.inertia), gravity)
+        # arrays of one kind, whatever they were given as: numba compiles for read-only ones anew
+        moved = BelievedObject(float(self.body.mass), np.array(here.lift_inertia(self.body.inertia)), np.array(gravity))
         source = WrenchSource(here.wrench_map, np.array(self.Q_w))
         return Belief(moved, held, source, self.law.coefficients, unknown)
 
@@ -240,7 +241,7 @@ class WrenchController:
         J, required = np.empty((len(self.Q_w), len(self.Q_f))), np.empty(len(self.Q_w))
         # copies that may be written, as in the compiled step: of read-only arrays numba would compile a second variant
         seen, wanted = [np.array(values) for values in measured], [np.array(values) for values in desired]
-        state_problem(self.belief, *seen, *wanted, np.empty((3, 3)), J, required)
+        state_problem(self.belief[:4], *seen, *wanted, np.empty((3, 3)), J, required)
         return J, required
 
 

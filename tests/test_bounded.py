@@ -10,6 +10,7 @@ from pivoting.controller.belief import for_worlds
 from pivoting.controller.bounded_solver import BREAK, GIVE_UP, BoundedSolver
 from pivoting.controller.kernels.compiled_step import step_worlds
 from pivoting.controller.solvers.clarabel_backend import POOR, ClarabelWithRetry
+from pivoting.controller.validate import frozen
 
 G = 10.0
 
@@ -184,7 +185,7 @@ def test_a_bound_is_a_heavier_weight(controller: WrenchController, kind: str) ->
         out, status = np.empty((1, 2 * nw + n + 1)), np.empty(1, np.int8)
         q, q_d = tilted(angle)[None], tilted(wanted)[None]
         own, none = tuple(bounds.stacked(nw)), np.zeros((1, nw))
-        state, desired = np.hstack([still, q, still, still]), np.hstack([q_d, still, still])
+        state, desired = frozen(np.hstack([still, q, still, still])), np.hstack([q_d, still, still])
         step_worlds(*belief, own, *work, 1e-9, state, desired, none, out, status)
         assert status[0] == 0
         return tuple(np.split(out[0, :-1], [nw, 2 * nw]))

@@ -10,6 +10,7 @@ from pivoting.controller import Body, Contact, Law, Motion, WrenchController, so
 from pivoting.controller.belief import for_worlds
 from pivoting.controller.kernels.compiled_step import apply_wrenches, step_worlds
 from pivoting.controller.kernels.kernel_cache import drop_stale
+from pivoting.controller.validate import frozen
 from scipy.spatial.transform import Rotation
 
 BLOCK = WrenchController(
@@ -35,8 +36,8 @@ class Stepped(NamedTuple):
 
 
 def states(q: np.ndarray, omega: np.ndarray) -> np.ndarray:
-    """(W, 13) of which only orientations (W, 4) and angular velocities (W, 3) matter."""
-    return np.hstack([np.zeros((len(q), 3)), q, np.zeros((len(q), 3)), omega])
+    """(W, 13) of which only orientations (W, 4) and angular velocities (W, 3) matter; read-only, as in the loop."""
+    return frozen(np.hstack([np.zeros((len(q), 3)), q, np.zeros((len(q), 3)), omega]))
 
 
 def stepped(

@@ -9,8 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba import typeof
 from numba.core.errors import NumbaError
+from pivoting.controller import WrenchController
 from pivoting.controller.kernels.compilation import kernel
+
+from tests.test_guarantee import planar, spatial
 
 COMPILED = ("kernel", "subroutine")
 BLOCK = """<mujoco><worldbody><geom type="plane" size="2 2 .1"/><body name="block" pos="0 0 .1"><freejoint/>
@@ -80,6 +84,16 @@ def test_one_compiled_loop_serves_a_scenario_and_an_object_of_ones_own(tmp_path:
         [sys.executable, "-c", LOOPS.format(path=str(path))], capture_output=True, text=True, check=True
     )
     assert done.stdout.split() == ["1"]
+
+
+def test_beliefs_are_of_one_type_in_the_plane_and_in_space_with_a_set_and_without() -> None:
+    """Or a kernel that takes one is compiled for each."""
+    rng, blocks = np.random.default_rng(0), []
+    for controller, *_ in (planar(rng, "com"), spatial(rng, 1), spatial(rng, 2)):
+        plain = WrenchController(controller.body, controller.contacts, controller.law, controller.gravity)
+        blocks += [controller.belief, plain.belief]
+    assert len({typeof(belief[:4]) for belief in blocks}) == 1
+    assert len({typeof(belief.unknown) for belief in blocks}) == 2
 
 
 BESIDE = """

@@ -31,9 +31,9 @@ def state_problem(belief, q, omega, q_d, omega_d, alpha_d, R, J, b):  # type: ig
     """Write the problem at one state: R (3, 3), J (nw, K d) and the required wrench b (nw,).
 
     Args:
-        belief: the values of a `Belief`.
+        belief: the values of a `Belief`, without a set: what is not used here would be compiled for, all the same.
     """
-    moved, held, (wrench_map, _), law, _ = belief
+    moved, held, (wrench_map, _), law = belief
     fill_rotation(q, R)
     fill_jacobian(R, held, wrench_map, J)
     fill_required(R, q, omega, q_d, omega_d, alpha_d, moved, held.pivot, held.offset, wrench_map, law, b)
