@@ -83,6 +83,7 @@ figures: $(STAMP)  ## the pictures of the site, and its pages of measured figure
 	$(BIN)/pivoting render pivot-3d --set reference=return --set seconds=1.7 --fps 20 --out docs/pivot.gif
 	$(BIN)/python benchmarks/page_picture.py docs/notes/pivot.md docs/wrench-along-the-arc.png
 	$(BIN)/python benchmarks/price_picture.py docs/price.png
+	$(BIN)/python benchmarks/evidence_learning.py --figure benchmarks/results/learning.json docs/price-learned.png
 	$(BIN)/python benchmarks/bench_formulations.py --figure benchmarks/results/formulations.json docs/formulations.png
 	$(BIN)/python benchmarks/bench_effort.py --figure benchmarks/results/effort.json docs/effort.png
 

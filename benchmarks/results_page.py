@@ -99,7 +99,7 @@ def formulations_table() -> str:
 def learning_table() -> str:
     """How much narrower the intervals are after one pivot."""
     values, rows = figures("learning"), []
-    for kind in dict.fromkeys(key.partition(": ")[0] for key in values):
+    for kind in dict.fromkeys(key.partition(": ")[0] for key in values if key.endswith(": runs")):
         own = {key.removeprefix(f"{kind}: "): value for key, value in values.items() if key.startswith(f"{kind}: ")}
         moments = [value for key, value in own.items() if key.startswith("m c_") and key.endswith("median")]
         cells = ", ".join(f"{value:.2f}" for value in moments)

@@ -23,7 +23,7 @@ def believing(mass: float, mu: float = 0.4, com: float = 0.0, law: Law | None = 
     return WrenchController(Body(mass, mass / 6.0), [corner], law or Law.dynamic(), (0.0, -10.0))
 
 
-CHANGES = {"pivot-2d": {"seconds": 0.3}, "mpc-2d": {"seconds": 0.1, "force_max": 8.0, "limits": {"settle_s": 0.05}}}
+CHANGES = {"pivot-2d": {"seconds": 0.3}, "mpc-2d": {"seconds": 0.03, "force_max": 8.0, "limits": {"settle_s": 0.015}}}
 
 
 @pytest.mark.parametrize("name", CHANGES)

@@ -75,7 +75,7 @@ def test_bounds_that_are_too_narrow_are_noticed() -> None:
 def test_the_box_is_that_of_all_cuts_by_another_solver(dim: int) -> None:
     """An interior point on the whole stack of half-spaces, none of which is left out as redundant."""
     (run,) = pivot_runs(4, 1, dim)
-    estimator, prior = SetMembership(run.unknowns), run.unknowns.polytope()
+    estimator, prior = SetMembership(run.unknowns), run.unknowns.polytope
     cuts = [make(run.log, run.errors, run.unknowns) for make in (moment_cuts, force_cuts)]
     for each in cuts:
         estimator.update(each)
@@ -154,7 +154,7 @@ def test_the_prior_holds_every_member(dim: int) -> None:
     """And no more than it has to of mass and first moment, whose bounds are products of ends."""
     rng = np.random.default_rng(8)
     (run,) = pivot_runs(8, 1, dim)
-    prior, known = run.unknowns.prior, run.unknowns.polytope()
+    prior, known = run.unknowns.prior, run.unknowns.polytope
     members = [prior.at(rng.random(3 + dim)) for _ in range(500)] + prior.vertices()
     points = np.array([run.unknowns.of(each.mass, each.com, each.inertia) for each in members])
     assert all(known.holds(x) for x in points)

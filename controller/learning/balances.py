@@ -58,6 +58,7 @@ class Balances:
 
     def __init__(self, log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns):
         self._log, self._errors, self._farthest = log, errors, unknowns.farthest
+        self.unknowns, self.time = unknowns, log.time
         self._turn = errors.theta * np.sqrt(1.0 if log.space.dim == 2 else 3.0)  # angle of an error of orientation
         self._R = np.array([rotation_matrix(q) for q in log.orientation])
         self._moment, self._force = world_moment(log), world_force(log)
@@ -81,6 +82,17 @@ class Balances:
         spreads += heavy[:, None] * self._farthest
         late = np.abs(along) @ (0.5 * w.duration**2 * np.abs(w.slope))
         return Cuts(rows, along @ w.step, spreads, late + self._moment_error(w, steps, along))
+
+    def sizes_of_errors(self, axis: int, x: Array) -> tuple[float, float]:
+        """Errors of the balance of moments about one axis, for unknowns x (n,): of a weight of height 1 and of a change
+        of its slope by 1/s, which are most of them."""
+        every = np.zeros(COUNT)
+        every[self.unknowns.used] = x
+        heavy = self._errors.shove + float(np.linalg.norm(np.cross(self._log.gravity, self._log.axes[axis]))) * (
+            self._turn * float(self.time[-1] - self.time[0])
+        )
+        size = float(np.atleast_1d(every[self._size]).sum()) * (1.0 if self._log.space.dim == 2 else 0.5)
+        return heavy * float(self._farthest @ every), self._turn * size
 
     def forces(self, window: Window) -> Cuts:
         """Of the balance of forces along each world axis that the plane or space has; contact forces are measured."""

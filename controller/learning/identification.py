@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from pivoting.controller.learning.balances import Balances, Cuts
 from pivoting.controller.learning.friction import FrictionBounds, friction_bounds
+from pivoting.controller.learning.isolating_windows import isolating_windows
 from pivoting.controller.learning.least_squares import RecursiveLeastSquares
 from pivoting.controller.learning.motion_log import SLIDES, MeasurementErrors, MotionLog
 from pivoting.controller.learning.parameters import Parameter, Seen, com_of, narrower, parameters
@@ -78,7 +79,8 @@ def identify(log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns, *, s
 
 def moment_cuts(log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns) -> Cuts:
     """The cuts of all windows in which the contact sticks."""
-    balances, found = Balances(log, errors, unknowns), windows(log.sticking)
+    balances, prior = Balances(log, errors, unknowns), unknowns.polytope
+    found = windows(log.sticking) + isolating_windows(balances, log.sticking, prior.low, prior.high)
     cuts = [balances.moments(window) for window in found]
     if log.angular_velocity is not None:
         spans = {(window.first, window.last): window for window in found}  # of which the shape does not matter here

@@ -14,7 +14,7 @@ class RecursiveLeastSquares:
     """
 
     def __init__(self, unknowns: Unknowns):
-        prior = unknowns.polytope()
+        prior = unknowns.polytope
         self._unknowns = unknowns
         self.mean: Array = 0.5 * (prior.low + prior.high)
         self.covariance: Array = np.diag((prior.high - prior.low) ** 2 / 12.0)

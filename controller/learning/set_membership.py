@@ -27,7 +27,7 @@ class SetMembership:
 
     def __init__(self, unknowns: Unknowns):
         self.unknowns = unknowns
-        self.prior = unknowns.polytope()
+        self.prior = unknowns.polytope
         self.set, self.resets = self.prior, 0
 
     def update(self, cuts: Cuts) -> Update:

@@ -105,6 +105,7 @@ class Unknowns:
         x = np.concatenate([[mass], mass * c, [tensor[i, j] for i, j in ENTRIES], [inertia]])
         return self.select(x)
 
+    @cached_property
     def polytope(self) -> Polytope:
         """What the prior says, from outside."""
         low, high = self._box()

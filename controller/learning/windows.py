@@ -58,15 +58,21 @@ def windows(usable: NDArray[np.bool_]) -> list[Window]:
     Those of one length are trapezoids, which find what the moments come to, and pairs of a trapezoid and its negative,
     which find how they change.
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], usable, [False]]).astype(int)))
     found = []
-    for begin, end in edges.reshape(-1, 2).tolist():
+    for begin, end in runs_of(usable):
         for halving in range(HALVINGS + 1):
             length = (end - begin) >> halving
             starts = np.linspace(begin, end - length, OVERLAP * (2**halving - 1) + 1).astype(int)
             for start in np.unique(starts).tolist():
                 found += _shapes(start, length)
     return sorted(found, key=lambda window: window.first - window.last)
+
+
+def runs_of(usable: NDArray[np.bool_]) -> list[list[int]]:
+    """The states at which each run of usable steps begins and ends."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], usable, [False]]).astype(int)))
+    runs: list[list[int]] = edges.reshape(-1, 2).tolist()
+    return runs
 
 
 def _shapes(start: int, length: int) -> list[Window]:
