@@ -46,7 +46,7 @@ def array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
         raise fail(name, value, f"an array of numbers of shape {_shown(shape)}") from None
     if given.dtype.kind not in "iuf":  # not bool, text, complex, object
         raise fail(name, value, f"an array of real numbers of shape {_shown(shape)}")
-    out = np.array(given, dtype=float)
+    out = np.array(given, dtype=float, order="C")  # of any other order numba would compile everything anew
     if out.shape != shape and (
         out.ndim != len(shape) or any(n not in (None, m) for n, m in zip(shape, out.shape, strict=True))
     ):

@@ -195,7 +195,7 @@ def test_semi_implicit_is_mujocos_free_body() -> None:
         mujoco.mj_step(model, data)
         rows.append(data.qpos.copy())
         rates.append(data.qvel.copy())
-    place, quat = np.array(rows)[:, :3], np.array(rows)[:, 3:]
+    place, quat = (np.ascontiguousarray(each) for each in np.split(np.array(rows), [3], axis=1))
     R = np.array([mujoco.mju_quat2Mat(m := np.empty(9), q) or m.reshape(3, 3) for q in quat])
     spin = np.einsum("tij,tj->ti", R, np.array(rates)[:, 3:])  # a free joint's rates are in object axes
     state = BodyState(place[0], quat[0], rates[0][:3], spin[0])
