@@ -48,8 +48,7 @@ def stages_of(begun: Begun, observe: Observe | None = None) -> Stages:
         raise ModelError(
             f"body = {body.name!r}: a disturbance observer knows no joint damping or friction; must have none"
         )
-    stages = build_stages(begun.case.stages, begun.setting)
-    return stages if observe is None else stages._replace(observe=(*stages.observe, observe))
+    return build_stages(begun.case.stages, begun.setting, observe)
 
 
 def laws_of(begun: Begun, stages: Stages) -> list[LawSolver]:

@@ -7,6 +7,8 @@ from pivoting.controller.wrench_controller import WrenchController
 from pivoting.sim.pipeline.bounded_control import applied
 from pivoting.sim.pipeline.stages import Desired, Setting, States
 
+STRAIGHT = np.array([1.0, 0.0, 0.0, 0.0])  # an orientation, where none has been measured yet
+
 
 class DisturbanceObserver:
     """A momentum observer (De Luca and Mattone 2003) of the unknown moment D about the contact.
@@ -14,6 +16,8 @@ class DisturbanceObserver:
     The angular momentum L about the contact changes by the moments of the wrench, of gravity and D, and the estimate r
     follows D with a lag of 1 / rate: r' = rate (D - r). The law's acceleration is reduced by what r would make, so that
     a constant D, such as that of a mass or a centre of mass that are not as believed, leaves no steady error.
+
+    A world whose state is no number keeps its estimate.
 
     There is nothing that winds up while bounds hold the wrench back: the observer counts the wrench that was given,
     within its bounds, and not the one that the law would have liked.
@@ -51,14 +55,15 @@ class DisturbanceObserver:
 
     def __call__(self, k: int, measured: States, applied_before: Array | None) -> States:
         """The states as they are, after the estimate has taken in what they say."""
-        q = np.array(measured.orientation)
+        seen = np.isfinite(measured.values).all(axis=1, keepdims=True)
+        q = np.where(seen, measured.orientation, STRAIGHT if self._before is None else self._before)
         momentum = rotated(q, _times(self._inertias, rotated(q * CONJUGATE, measured.angular_velocity)))
         given = applied(applied_before)
         if given is None or self._before is None:
-            self._expected, self._unexplained = momentum, np.zeros_like(momentum)
+            self._expected, self._unexplained = np.where(seen, momentum, 0.0), np.zeros_like(momentum)
         else:
             self._expected = self._expected + self._dt * (self._known(self._before, given) + self._unexplained)
-            self._unexplained = self._rate * (momentum - self._expected)
+            self._unexplained = np.where(seen, self._rate * (momentum - self._expected), self._unexplained)
         self._before = q
         return measured
 

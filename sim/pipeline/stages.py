@@ -317,11 +317,14 @@ class Stages(NamedTuple):
         return control
 
 
-def build_stages(values: Mapping[str, float], setting: Setting) -> Stages:
+def build_stages(values: Mapping[str, float], setting: Setting, own: Observe | None = None) -> Stages:
     """The stages that a scenario's keys ask for.
+
+    What observes in order to correct the reference goes by the estimated state, and so comes after all that estimates.
 
     Args:
         values: by the place of a stage's class, "module:Class", that of the first of its keys that is set.
+        own: an observer of the user's own, which goes by what the scenario's estimates.
     """
     built: dict[str, list[Any]] = {slot: [] for slot in Stages._fields}
     for place, value in values.items():
@@ -330,4 +333,6 @@ def build_stages(values: Mapping[str, float], setting: Setting) -> Stages:
         built[made.slot].append(made)
         if made.slot == "observe" and hasattr(made, "correct"):  # what it observes, it takes away again
             built["correct"].append(made.correct)
+    built["observe"] += [] if own is None else [own]
+    built["observe"].sort(key=lambda stage: hasattr(stage, "correct"))
     return Stages(**{slot: tuple(stages) for slot, stages in built.items()})
