@@ -3,6 +3,30 @@
 import numpy as np
 import pytest
 from pivoting import simulate
+from pivoting.sim.pipeline.stages import States
+from pivoting.sim.run_setup import set_up
+from pivoting.sim.scenario_control import stages_of
+from pivoting.sim.scenarios.shipped_scenarios import scenario
+
+
+def test_it_goes_by_the_estimated_state_whatever_the_order_of_the_keys() -> None:
+    """And not by rates that are measured exactly, which an observer does not use."""
+    begun = set_up(scenario("pivot-2d").change(disturbance=20.0, observer=60.0), None, worlds=1, seed=0, first_world=0)
+
+    def own(k: int, measured: States, applied: np.ndarray | None) -> States:
+        return measured
+
+    assert [type(stage).__name__ for stage in stages_of(begun, own).observe] == [
+        "ModelObserver", "function", "DisturbanceObserver",
+    ]  # fmt: skip
+
+
+def test_it_outlives_measurements_that_are_no_numbers() -> None:
+    keys = {"seconds": 0.6, "theta_end": 25.0, "safe_after": 0.02, "broken": 0.1, "fault_start": 0.0}
+    run = simulate("pivot-2d", disturbance=10.0, **keys)
+    assert np.isnan(run.log.measured).any()
+    assert not run.measures.safe_s.any()
+    assert run.measures.slip_max_m[0] < 2e-5
 
 
 @pytest.mark.parametrize("name", ["balance-2d", "pivot-3d"])

@@ -132,6 +132,31 @@ def test_under_strong_faults_the_contact_sticks(name: str) -> None:
     assert not held.measures.unsolved_steps.any(), said(held)
 
 
+SET = {
+    "mass": (0.8, 1.2), "com": (-0.05, 0.05), "inertia": (0.8, 1.2), "mu": 0.25, "disturbance": 10.0,
+    "worlds_at": "vertices", "first_world": 10, "worlds": 1,
+}  # fmt: skip
+MORE = {"shove": {"shove_bound": 0.2, "f_min": 0.0}, "friction": {"mu_falls_to": 0.225}}
+
+
+@pytest.mark.parametrize("name", ["normal noise", "delay", "broken", "slow control", "force rate", "shove", "friction"])
+def test_under_strong_faults_the_contact_of_an_object_that_is_not_as_believed_sticks_as_well(name: str) -> None:
+    """In a world at the edge of its set that slides as soon as nothing is guaranteed, fault or not."""
+    fault = FAULTS[name]
+    held = simulate(
+        "pivot-2d", **{**ARC, "safe_after": 0.02, **fault.always, **fault.strong, **SET, **MORE.get(name, {})}
+    )
+    assert held.measures.slip_max_m.max() < 2e-5, said(held)
+    assert held.measures.angle_error_max_deg.max() < 2.0, said(held)
+    assert not held.measures.safe_s.any(), said(held)
+    assert not held.measures.unsolved_steps.any(), said(held)
+
+
+def test_that_world_slides_where_nothing_is_guaranteed() -> None:
+    slid = simulate("pivot-2d", **{**ARC, **SET, "guarantee": "none"})
+    assert slid.measures.slip_max_m[0] > 5e-3, said(slid)
+
+
 @pytest.mark.parametrize("name", FAULTS)
 def test_beyond_that_the_object_goes_over_to_a_safe_state(name: str) -> None:
     fault = FAULTS[name]
