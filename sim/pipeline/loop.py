@@ -84,9 +84,10 @@ class Steps:
             if stages.disturb:
                 _disturb(k, stages, apply, log)
             plant.step()
-            block[k - first] = plant.sensed
+            if len(block) > 1:
+                block[k - first] = plant.sensed
             if k + 1 - first == len(block) or k + 1 == last:
-                sensed = block[: k + 1 - first]
+                sensed = block[: k + 1 - first] if len(block) > 1 else plant.sensed[None]
                 log.states[first + 1 : k + 2] = sensed[..., :STATE]
                 contacts.sort(first, log.states[first : k + 1], sensed)
                 first = k + 1
