@@ -113,6 +113,23 @@ def learning_table() -> str:
     return table(["", "m c, each component", "inertia about the contact", "mass", "truth lost"], rows)
 
 
+def sweep_table() -> str:
+    """Of the worlds of a sweep that were run in three ways: how many fail, and what it costs."""
+    values, rows = figures("sweep"), []
+    for name in ("pivot-2d", "pivot-3d"):
+        floor = values[f"{name}: smallest constant floor without a failure, N"]
+        ways = {
+            "guaranteed": "with the guarantee",
+            "not guaranteed": "without it",
+            "constant floor": f"with the smallest constant floor without a failure, {floor:.3g} N, found in hindsight",
+        }
+        for how, words in ways.items():
+            names = "failures of those drawn", "failures of the vertices", "objective, mean, N^2", "force, RMS, N"
+            drawn, vertices, objective, force = (values[f"{name} compared, {how}: {each}"] for each in names)
+            rows.append([f"{name}, {words}", f"{drawn:.0f} + {vertices:.0f}", f"{objective:.0f}", f"{force:.1f}"])
+    return table(["", "fail, drawn + vertices", "objective, N²", "force, RMS, N"], rows)
+
+
 def guarantee_table() -> str:
     """Of random sets: what a search for their worst members finds, and how much more than needed is asked for."""
     values, rows = figures("guarantee"), []
@@ -243,6 +260,7 @@ PARTS: dict[str, Callable[[], str]] = {
         guarantee_cost_table,
         guarantee_table,
         learning_table,
+        sweep_table,
         loop_table,
         horizon_table,
         compile_table,
