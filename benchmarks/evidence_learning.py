@@ -31,7 +31,7 @@ SHOVES = {"no shove": 0.0, "shove of 0.2 N s/kg": 0.2}
 KINDS, COMPONENTS = {2: "plane", 3: "space"}, {2: "uv", 3: "xyz"}
 SIGMAS = 3.0
 SHARES, PRICED, MU = (0.0, 0.25, 0.5, 0.75, 1.0), 50, 0.25
-MEASURED = {"motion alone": False, "and contact forces": True}
+MEASURED = {"motion alone": False, "motion and contact forces": True}
 
 
 def learned(run: PivotRun) -> tuple[bool, np.ndarray, np.ndarray, bool, tuple[float, float]]:

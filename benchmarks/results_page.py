@@ -37,7 +37,10 @@ SCENARIO_COLUMNS = {
 @cache
 def saved(name: str) -> dict:
     """A saved run: figures, machine and bounds."""
-    return json.loads((BENCHMARKS / f"results/{name}.json").read_text())
+    found = json.loads((BENCHMARKS / f"results/{name}.json").read_text())
+    if not found.get("complete", True):
+        raise ValueError(f"{name}.json is part of a run that did not come to its end")
+    return found
 
 
 def figures(name: str) -> dict[str, float]:

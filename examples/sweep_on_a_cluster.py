@@ -20,7 +20,8 @@ def main() -> None:
         tempfile.TemporaryDirectory() as folder,
     ):
         out = Path(folder) / "worlds.parquet"  # a sweep that is killed goes on from what is there: resume=True
-        swept = sweep("pivot-2d", 24, SETS, out=out, chunk=6, executor=client.get_executor(), limits=LIMITS, **SHORT)
+        pool = client.get_executor(pure=False)
+        swept = sweep("pivot-2d", 24, SETS, out=out, chunk=6, executor=pool, limits=LIMITS, **SHORT)
         again = read_sweep(out)
     print(f"{len(swept.failed)} of {swept.worlds} worlds fail; the file has {again.worlds}")
     run = swept.replay(5)

@@ -71,9 +71,11 @@ def test_a_kernel_that_allocates_is_refused() -> None:
 LOOPS = """
 from pivoting.controller.kernels.compiled_step import step_worlds
 from pivoting.sim import own_object, simulate
+from pivoting.sim.contact_sensing import sort_contacts
 simulate("spin-3d")
 simulate(own_object({path!r}, "block", "vertex"))
-print(len(step_worlds.signatures))
+simulate("spin-3d", worlds=600, seconds=0.02, hold=0.02, limits={{"settle_s": 0.01}})  # sorted step by step
+print(len(step_worlds.signatures), len(sort_contacts.signatures))
 """
 
 
@@ -83,7 +85,7 @@ def test_one_compiled_loop_serves_a_scenario_and_an_object_of_ones_own(tmp_path:
     done = subprocess.run(
         [sys.executable, "-c", LOOPS.format(path=str(path))], capture_output=True, text=True, check=True
     )
-    assert done.stdout.split() == ["1"]
+    assert done.stdout.split() == ["1", "1"]
 
 
 def test_beliefs_are_of_one_type_in_the_plane_and_in_space_with_a_set_and_without() -> None:

@@ -7,12 +7,13 @@ import pytest
 from pivoting.controller.learning.balances import Balances, Cuts
 from pivoting.controller.learning.friction import friction_bounds
 from pivoting.controller.learning.identification import Identification, force_cuts, identify, moment_cuts
+from pivoting.controller.learning.isolating_windows import isolating_windows
 from pivoting.controller.learning.least_squares import RecursiveLeastSquares
 from pivoting.controller.learning.motion_log import MeasurementErrors, motion_log
 from pivoting.controller.learning.polytope import Polytope
 from pivoting.controller.learning.set_membership import SetMembership
 from pivoting.controller.learning.unknowns import Unknowns
-from pivoting.controller.learning.windows import weights, windows
+from pivoting.controller.learning.windows import Window, weights, windows
 from pivoting.controller.plane_and_space import space
 from pivoting.controller.rotations import exponential, quaternion_product, rotated
 from pivoting.controller.uncertainty.uncertainty import Interval, Uncertainty
@@ -176,6 +177,27 @@ def test_a_weight_is_integrated_exactly() -> None:
         assert w.around.sum() == pytest.approx(exact, abs=1e-9)
         assert w.slope @ w.duration == pytest.approx(0.0, abs=1e-12)
         assert (w.size >= np.abs(w.step)).all()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_windows_made_for_a_log_tell_more_of_it_and_any_others_hold_the_truth(dim: int) -> None:
+    rng, narrower = np.random.default_rng(dim), []
+    for run in pivot_runs(5, 4, dim, 0.2):
+        balances, prior = Balances(run.log, run.errors, run.unknowns), run.unknowns.polytope
+        made = isolating_windows(balances, run.log.sticking, prior.low, prior.high)
+        assert len(made) >= 3
+        corners = made[0].corners
+        any_ = [Window(corners, (0.0, *rng.uniform(-1.0, 1.0, len(corners) - 2), 0.0)) for _ in range(50)]
+        boxes = []
+        for more in ([], made, any_):
+            estimator = SetMembership(run.unknowns)
+            estimator.update(Cuts.together([balances.moments(each) for each in windows(run.log.sticking) + more]))
+            assert estimator.set.holds(run.truth)
+            assert estimator.resets == 0
+            boxes.append((estimator.set.high - estimator.set.low)[1 : 1 + dim])
+        assert (boxes[1] <= boxes[0] * (1.0 + 1e-9)).all()
+        narrower.append((boxes[1] / boxes[0]).min())
+    assert np.median(narrower) < 0.98
 
 
 def test_least_squares_find_it_but_guarantee_nothing() -> None:

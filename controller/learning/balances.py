@@ -54,6 +54,9 @@ class Balances:
 
     Args:
         unknowns: of the object.
+
+    Attributes:
+        unknowns: as given.  time: (N+1,) of the log [s].
     """
 
     def __init__(self, log: MotionLog, errors: MeasurementErrors, unknowns: Unknowns):
@@ -84,14 +87,14 @@ class Balances:
         return Cuts(rows, along @ w.step, spreads, late + self._moment_error(w, steps, along))
 
     def sizes_of_errors(self, axis: int, x: Array) -> tuple[float, float]:
-        """Errors of the balance of moments about one axis, for unknowns x (n,): of a weight of height 1 and of a change
-        of its slope by 1/s, which are most of them."""
+        """Errors of the balance of moments about one axis, for unknowns x (n,): of a weight of height 1 all the time,
+        and of a change of its slope by 1/s. They say which windows are good; no bound is made of them."""
         every = np.zeros(COUNT)
         every[self.unknowns.used] = x
         heavy = self._errors.shove + float(np.linalg.norm(np.cross(self._log.gravity, self._log.axes[axis]))) * (
             self._turn * float(self.time[-1] - self.time[0])
         )
-        size = float(np.atleast_1d(every[self._size]).sum()) * (1.0 if self._log.space.dim == 2 else 0.5)
+        size = float(every[self._size].sum()) * (1.0 if self._log.space.dim == 2 else 0.5)
         return heavy * float(self._farthest @ every), self._turn * size
 
     def forces(self, window: Window) -> Cuts:

@@ -26,7 +26,7 @@ def isolating_windows(balances: Balances, usable: NDArray[np.bool_], low: Array,
     found = []
     for begin, end in runs_of(usable):
         hats = min(HATS, (end - begin) // LEAST_STEPS - 1)
-        if hats < 3:
+        if hats < 3:  # fewer cannot tell apart what a balance in the plane holds: two moments and an inertia
             continue
         corners = np.linspace(begin, end, hats + 2).astype(int)
         rows = np.stack(
@@ -74,6 +74,7 @@ def _isolating(rows: Array, half: Array, time: Array, impulse: float, kink: floa
         once = np.concatenate([rows[:, i] * half[i], np.zeros(1 + m)])[None]
         bounds = [(None, None)] * hats + [(0.0, None)] * (1 + m)
         answer = linprog(cost, A, np.zeros(len(A)), once, [1.0], bounds)
+        # without an answer there is a window less, which is all that it costs
         if answer.x is not None and (most := np.abs(answer.x[:hats]).max()) > 0.0:
             found.append(tuple((answer.x[:hats] / most).tolist()))
     return found

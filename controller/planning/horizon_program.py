@@ -46,7 +46,7 @@ class HorizonProgram:
         self._fixed = fixed_pairs(belief.contacts.points, belief.contacts.pivot, belief.source.map)
         self._sticking = space.dim + len(self._fixed) if horizon.stick else 0
         self._clear = np.array(horizon.clear)
-        self._Q = np.array(horizon.Q, order="C") / force**2
+        self._Q = np.array(horizon.Q, order="C") / force**2  # one weight for all poses has strides of 0
         own = friction_limits(belief.contacts.mu, belief.contacts.f_min / force, space.dim)
         bound = wrench_limits(horizon.bounds, nq, horizon.edges, scale, horizon.h)
         linear = [len(own.linear), len(bound.linear), len(self._clear)]

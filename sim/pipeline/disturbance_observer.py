@@ -7,8 +7,6 @@ from pivoting.controller.wrench_controller import WrenchController
 from pivoting.sim.pipeline.bounded_control import applied
 from pivoting.sim.pipeline.stages import Desired, Setting, States
 
-STRAIGHT = np.array([1.0, 0.0, 0.0, 0.0])  # an orientation, where none has been measured yet
-
 
 class DisturbanceObserver:
     """A momentum observer (De Luca and Mattone 2003) of the unknown moment D about the contact.
@@ -56,11 +54,11 @@ class DisturbanceObserver:
     def __call__(self, k: int, measured: States, applied_before: Array | None) -> States:
         """The states as they are, after the estimate has taken in what they say."""
         seen = np.isfinite(measured.values).all(axis=1, keepdims=True)
-        q = np.where(seen, measured.orientation, STRAIGHT if self._before is None else self._before)
+        q = np.where(seen, measured.orientation, measured.orientation if self._before is None else self._before)
         momentum = rotated(q, _times(self._inertias, rotated(q * CONJUGATE, measured.angular_velocity)))
         given = applied(applied_before)
         if given is None or self._before is None:
-            self._expected, self._unexplained = np.where(seen, momentum, 0.0), np.zeros_like(momentum)
+            self._expected, self._unexplained = momentum, np.zeros_like(momentum)
         else:
             self._expected = self._expected + self._dt * (self._known(self._before, given) + self._unexplained)
             self._unexplained = np.where(seen, self._rate * (momentum - self._expected), self._unexplained)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pivoting.controller.kernels.compilation import first_calls
 from pivoting.controller.kernels.compiled_step import STATE
 from pivoting.controller.kernels.second_compiler import compiled_beside
-from pivoting.controller.validate import fail
+from pivoting.controller.validate import fail, frozen
 from pivoting.sim.contact_sensing import sort_contacts
 from pivoting.sim.pipeline.apply_wrench import FreeWrench
 from pivoting.sim.pipeline.contact_log import ContactLog
@@ -44,14 +44,16 @@ class Steps:
     ):
         self._plant, self._stages, self._control, self._apply, self._contacts = plant, stages, control, apply, contacts
         self.log, self.made = log, 0
+        # of the readings of one step alone the batch has the array; of several this one, shown likewise: read-only
         self._block = np.empty((min(len(log.control_ns), contacts.most), *plant.sensed.shape))
+        self._readings = plant.sensed[None] if len(self._block) == 1 else frozen(self._block.view())
         self._before: Array | None = None
         self.log.states[0] = plant.sensed[:, :STATE]
 
     def prepare(self) -> None:
         """Compile all that a step calls, so that no step waits for it."""
         log, states = self.log, self._plant.states
-        nw, nothing = log.answers.nw, (log.states[:0], self._block[:0])
+        nw, nothing = log.answers.nw, (log.states[:0], self._readings[:0])
         with first_calls():
             with compiled_beside(sort_contacts, *self._contacts.arguments(*nothing)):
                 first_answers = Answers(log.answers.values[0], log.answers.status[0], nw)
@@ -70,6 +72,7 @@ class Steps:
         """
         plant, stages, control, apply, contacts = self._plant, self._stages, self._control, self._apply, self._contacts
         log, block, before, states = self.log, self._block, self._before, plant.states
+        readings = self._readings
         nw, steps, first = log.answers.nw, len(log.control_ns), self.made
         report = max(1, steps // 100)
         answers = zip(log.answers.values[first:last], log.answers.status[first:last], strict=True)
@@ -87,7 +90,7 @@ class Steps:
             if len(block) > 1:
                 block[k - first] = plant.sensed
             if k + 1 - first == len(block) or k + 1 == last:
-                sensed = block[: k + 1 - first] if len(block) > 1 else plant.sensed[None]
+                sensed = readings[: k + 1 - first]
                 log.states[first + 1 : k + 2] = sensed[..., :STATE]
                 contacts.sort(first, log.states[first : k + 1], sensed)
                 first = k + 1

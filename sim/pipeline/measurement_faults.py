@@ -56,5 +56,5 @@ class BrokenMeasurement:
         self._happens = Chance(share, "BrokenMeasurement", setting)
 
     def __call__(self, k: int, states: States) -> States:
-        """What arrives at step k."""
-        return states.changed(np.where(self._happens(k)[:, None], np.nan, states.values))
+        """What arrives at step k; the first measurement always does."""
+        return states if k == 0 else states.changed(np.where(self._happens(k)[:, None], np.nan, states.values))

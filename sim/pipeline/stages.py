@@ -333,6 +333,7 @@ def build_stages(values: Mapping[str, float], setting: Setting, own: Observe | N
         built[made.slot].append(made)
         if made.slot == "observe" and hasattr(made, "correct"):  # what it observes, it takes away again
             built["correct"].append(made.correct)
-    built["observe"] += [] if own is None else [own]
-    built["observe"].sort(key=lambda stage: hasattr(stage, "correct"))
+    estimating = [stage for stage in built["observe"] if not hasattr(stage, "correct")]
+    correcting = [stage for stage in built["observe"] if hasattr(stage, "correct")]
+    built["observe"] = [*estimating, *([] if own is None else [own]), *correcting]
     return Stages(**{slot: tuple(stages) for slot, stages in built.items()})
