@@ -4,9 +4,10 @@ Half of the worlds are drawn from the set, half are its vertices. Only a noisy a
 is shoved once. A world holds if its contact slips at most 1 mm more than the simulator itself causes, its angle is
 never off by more than 0.5 deg, and its steady error is at most 0.1 deg.
 
-Beside the guarantee are some of the same worlds, 2,000 in the plane and 500 in space, without it, and with the smallest constant floor under the
-normal force with which none of them fails. It is found by bisection on these very worlds, in hindsight, with the least
-friction of the set believed, which makes it smaller. Among all ten thousand it would be no smaller.
+Beside the guarantee are some of the same worlds, 2,000 in the plane and 500 in space, without it, and with the
+smallest constant floor under the normal force with which none of them fails. It is found by bisection on these very
+worlds, in hindsight, with the least friction of the set believed, which makes it smaller. Among all ten thousand it
+would be no smaller.
 """
 
 import os

@@ -52,5 +52,6 @@ LONG = ("test_fleet", "test_wheel", "test_view", "test_kernel", "test_scenario_f
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The files that take longest come first, so that no worker is left alone with one of them at the end.
 
-    Of the first two only one fills the cache: two workers that need the same kernels at once would both compile them."""
+    Of the first two only one fills the cache: two workers that need the same kernels would both compile them.
+    """
     items.sort(key=lambda item: (*LONG, item.path.stem).index(item.path.stem))
