@@ -42,7 +42,11 @@ def test_its_table_is_of_the_committed_results() -> None:
     residuals = [value for key, value in space.items() if key.endswith("contacts, space: greatest KKT residual")]
     slip, floor = (1e3 * plane[f"pivot-2d: {key}"] for key in ("slip_max_m", "slip_floor_m"))
     counts = [f"{objects[name]:.0f}" for name in ("objects", "pass", "runs", "fail", "refused")]
-    held = saved("guarantee")["figures"]
+    held, swept = saved("guarantee")["figures"], saved("sweep")["figures"]
+
+    def failed(how: str) -> float:
+        return swept[f"{how}: failures of those drawn"] + swept[f"{how}: failures of the vertices"]
+
     deciding = saved("loop")["figures"]["one world: state, solve, certify, us"]
     assert plane["closed-form: failures"] == objects["wrong refusals"] == 0.0
     rows = [
@@ -57,6 +61,13 @@ def test_its_table_is_of_the_committed_results() -> None:
             held["pivot-2d: vertices"],
             1e3 * held["pivot-2d, guarantee=set: slip_max_m"],
             1e3 * held["pivot-2d, guarantee=none: slip_max_m"],
+        ),
+        "| {:,.0f} worlds in which model, friction and measured pose are wrong, each shoved once | {:.0f} fail with "
+        "the guarantee; {:.0f} of {:,.0f} without it |".format(
+            swept["pivot-2d: worlds"],
+            failed("pivot-2d, guaranteed"),
+            failed("pivot-2d compared, not guaranteed"),
+            swept["pivot-2d: worlds compared"],
         ),
         "| {} objects from published packages | {} of {} runs pass, {} fail, {} are refused, none wrongly |".format(
             *counts
