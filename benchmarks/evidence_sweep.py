@@ -39,7 +39,7 @@ THETA_ERROR = {"pivot-2d": 0.15, "pivot-3d": 0.2}  # [deg]
 SLIP_M, ANGLE_DEG, STEADY_DEG = 1e-3, 0.5, 0.1
 REST_S, AFTER_S = 0.1, 0.2  # over which the steady error is taken, and how long ago the shove has to be
 CHUNK, WORLDS, COMPARED = 125, 10_000, {"pivot-2d": 2_000, "pivot-3d": 500}
-HIGHEST, FINE = 64.0, 0.5  # floors [N]: the greatest that is tried, and how finely
+FIRST, HIGHEST, FINE = 64.0, 4096.0, 0.01  # floors [N]: tried first, and at most; and how finely, of each
 
 
 def case(name: str, guarantee: str, floor: float = 0.0) -> Any:
@@ -124,8 +124,11 @@ def smallest_floor(pool: ProcessPoolExecutor, name: str, worlds: int, order: Seq
 
     Args:
         order: the chunks, those first in which most worlds fail without a floor.
+
+    Returns:
+        inf where no floor of up to `HIGHEST` will do.
     """
-    suspects, low, high = list(order[:2]), 0.0, HIGHEST
+    suspects, low, high = list(order[:2]), 0.0, FIRST
 
     def fails(floor: float, which: Sequence[int]) -> list[int]:
         chunks = tasks(name, worlds, "none", floor)
@@ -133,13 +136,17 @@ def smallest_floor(pool: ProcessPoolExecutor, name: str, worlds: int, order: Seq
         return [i for i, each in zip(which, rows, strict=True) if lost(each).any()]
 
     while True:
-        while high - low > FINE:
+        while fails(high, suspects):
+            low, high = high, 2.0 * high
+            if high > HIGHEST:
+                return float("inf")
+        while high - low > FINE * high:
             middle = 0.5 * (low + high)
             low, high = (middle, high) if fails(middle, suspects) else (low, middle)
         found = fails(high, [i for i in order if i not in suspects])
         if not found:
             return high
-        suspects, low, high = found[:2], high, HIGHEST
+        suspects, low, high = found[:2], high, 2.0 * high
 
 
 def said(words: str, rows: Sequence[dict[str, np.ndarray]]) -> dict[str, float]:
