@@ -39,6 +39,7 @@ from pivoting.sim.world import World
 
 Array = NDArray[np.float64]
 LANE = 64  # worlds that are worth a thread
+MOST_IN_LANE = 128  # worlds that are stepped together: what MuJoCo keeps of them stays in the caches
 
 
 @overload
@@ -169,8 +170,8 @@ def _plain(decided: Decided, handed: Handed) -> bool:
 
 
 def _lanes(worlds: int) -> list[tuple[int, int]]:
-    """The first and one past the last world of each part that a processor of its own steps."""
-    parts = max(1, min(os.cpu_count() or 1, worlds // LANE))
+    """The first and one past the last world of each part: at least one for each processor, and not too many in one."""
+    parts = max(1, min(os.cpu_count() or 1, worlds // LANE), -(-worlds // MOST_IN_LANE))
     return list(pairwise(worlds * part // parts for part in range(parts + 1)))
 
 

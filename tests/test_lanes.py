@@ -21,15 +21,20 @@ def timeless(run: Run) -> Run:
 
 @pytest.mark.parametrize("name", ["pivot-2d", "settle-3d"])
 def test_lanes_change_nothing(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Bit for bit, also where the worlds are not shared out evenly."""
+    """Bit for bit, also where the worlds are not shared out evenly, and where there are more lanes than threads."""
     several = len(simulation._lanes(135))
+    monkeypatch.setattr(simulation, "MOST_IN_LANE", 1000)
     monkeypatch.setattr(simulation, "LANE", 45)
     monkeypatch.setattr("os.cpu_count", lambda: 3)
     assert [last - first for first, last in simulation._lanes(136)] == [45, 45, 46]
     apart = simulate(name, 136, **FEW)
     monkeypatch.setattr(simulation, "LANE", 1000)
     assert len(simulation._lanes(136)) == 1 <= several
-    assert_same(timeless(apart), timeless(simulate(name, 136, **FEW)))
+    together = timeless(simulate(name, 136, **FEW))
+    assert_same(timeless(apart), together)
+    monkeypatch.setattr(simulation, "MOST_IN_LANE", 20)
+    assert [last - first for first, last in simulation._lanes(136)] == [19, 19, 20, 19, 20, 19, 20]
+    assert_same(timeless(simulate(name, 136, **FEW)), together)
 
 
 @pytest.mark.parametrize("first", [True, False])

@@ -1,5 +1,6 @@
 """The steps of a closed loop: sense, observe, control, actuate, apply, disturb, step; all of it is logged."""
 
+import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from itertools import chain
@@ -100,10 +101,11 @@ class Steps:
 
 
 def run_steps(lanes: Sequence[Steps], progress: Callable[[int, int], None] | None) -> float:
-    """Make all steps of all worlds, whose parts are stepped at the same time.
+    """Make all steps of all worlds, whose parts are stepped at the same time, as many as there are processors.
 
     Args:
-        lanes: of the parts; what they call, MuJoCo and the kernels, runs without the interpreter's lock.
+        lanes: of the parts, each of which one thread for each processor steps to its end before it takes another; what
+            they call, MuJoCo and the kernels, runs without the interpreter's lock.
         progress: see `Steps.make`; it is called from this thread.
 
     Returns:
@@ -113,26 +115,42 @@ def run_steps(lanes: Sequence[Steps], progress: Callable[[int, int], None] | Non
         steps.prepare()  # compiled before it is timed
     start = perf_counter()
     every, stop, others = len(lanes[0].log.control_ns), Event(), list[Future[None]]()
+    made = [0] * len(lanes)
 
-    def unless_stopped(done: int, of: int) -> None:
-        if stop.is_set():
-            raise CancelledError  # another lane has failed, whose error is raised
+    def make(i: int) -> None:
+        def unless_stopped(done: int, of: int) -> None:
+            if stop.is_set():
+                raise CancelledError  # another lane has failed, whose error is raised
+            made[i] = done
 
-    def unless_failed(done: int, of: int) -> None:
-        for other in others:
-            if other.done():
-                other.result()
-        if progress is not None:
-            progress(done, of)
+        lanes[i].make(every, unless_stopped)
 
-    with ThreadPoolExecutor(len(lanes)) as pool:
-        try:
-            others += [pool.submit(steps.make, every, unless_stopped) for steps in lanes[1:]]
-            lanes[0].make(every, unless_failed)
+    def make_here(i: int) -> None:
+        def unless_failed(done: int, of: int) -> None:
             for other in others:
-                other.result()
+                if other.done() and not other.cancelled():
+                    other.result()
+            made[i] = done
+            if progress is not None:
+                progress(sum(made) // len(made), of)
+
+        lanes[i].make(every, unless_failed)
+
+    with ThreadPoolExecutor(max(1, min(len(lanes), os.cpu_count() or 1) - 1)) as pool:
+        try:
+            others += [pool.submit(make, i) for i in range(1, len(lanes))]
+            make_here(0)
+            for i in range(len(lanes) - 1, 0, -1):  # the last are those that no other thread has begun
+                if others[i - 1].cancel():
+                    make_here(i)
+            for other in others:
+                if not other.cancelled():
+                    other.result()
+            if progress is not None and len(lanes) > 1:
+                progress(every, every)
         finally:  # after an error, or an interrupt, which only this thread gets
             stop.set()
+            pool.shutdown(cancel_futures=True)
     return perf_counter() - start
 
 
