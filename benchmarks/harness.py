@@ -106,12 +106,18 @@ def main(
         return
     saved = {} if args.compare is None else _figures(parser, "--compare", args.compare)
     measured, figures = measure(args.quick), dict[str, float]()
+
+    def save(**more: bool) -> None:
+        if args.json is not None:
+            asked = {"bounds": bounds, "floors": floors, "quick": args.quick}
+            args.json.write_text(
+                json.dumps({"figures": figures, **asked, **more, "machine": machine()}, indent=1) + "\n"
+            )
+
     for part in [measured] if isinstance(measured, dict) else measured:
         figures |= part
-        if args.json is not None:
-            _save(args.json, figures, bounds, floors, args.quick, complete=False)
-    if args.json is not None:
-        _save(args.json, figures, bounds, floors, args.quick, complete=True)
+        save(complete=False)
+    save()
     width = max(len(name) for name in figures if brief(name))
     print(f"{'':{width}}  {'now':>10}" + (f"  {'saved':>10}" if saved else "") + "   asked")
     for name, value in figures.items():
@@ -127,13 +133,6 @@ def main(
         print(row)
     exceeded = any(figures[name] > bound for name, bound in bounds.items())
     raise SystemExit(exceeded or any(figures[name] < floor for name, floor in floors.items()))
-
-
-def _save(path: Path, figures: dict[str, float], *rules: Any, complete: bool) -> None:
-    """Write figures, what is asked of them, and the machine; of a part, that it is one."""
-    asked = dict(zip(("bounds", "floors", "quick"), rules, strict=True))
-    result = {"figures": figures, **asked, **({} if complete else {"complete": False}), "machine": machine()}
-    path.write_text(json.dumps(result, indent=1) + "\n")
 
 
 def _figures(parser: argparse.ArgumentParser, option: str, path: Path) -> dict[str, float]:

@@ -68,6 +68,8 @@ class Balances:
         self._arm = np.linalg.norm(log.force, axis=1) * float(np.linalg.norm(log.lever))  # (N,) of moments [N m]
         self._load = np.linalg.norm(log.moment, axis=1) + self._arm
         self._tensors = np.array([_momentum_rows(self._R, axis) for axis in log.axes])  # (A, N, 6)
+        self._across = np.linalg.norm(np.cross(log.gravity, log.axes), axis=1)  # (A,) gravity across the axes
+        self._second = 1.0 if log.space.dim == 2 else 0.5  # times the unknowns `_size`: the second moment of the mass
         self._arms = np.array([np.cross(log.gravity, axis) @ self._R for axis in log.axes])  # (A, N+1, 3)
 
     def moments(self, window: Window) -> Cuts:
@@ -81,7 +83,7 @@ class Balances:
         along = log.axes @ self._moment[steps].T  # (A, n)
         spreads[:, self._size] = self._momentum_error(w)
         turned = self._turn * w.size.sum() + self._between(w)
-        heavy = np.linalg.norm(np.cross(log.gravity, log.axes), axis=1) * turned + errors.shove
+        heavy = self._across * turned + errors.shove
         spreads += heavy[:, None] * self._farthest
         late = np.abs(along) @ (0.5 * w.duration**2 * np.abs(w.slope))
         return Cuts(rows, along @ w.step, spreads, late + self._moment_error(w, steps, along))
@@ -91,11 +93,9 @@ class Balances:
         and of a change of its slope by 1/s. They say which windows are good; no bound is made of them."""
         every = np.zeros(COUNT)
         every[self.unknowns.used] = x
-        heavy = self._errors.shove + float(np.linalg.norm(np.cross(self._log.gravity, self._log.axes[axis]))) * (
-            self._turn * float(self.time[-1] - self.time[0])
-        )
-        size = float(every[self._size].sum()) * (1.0 if self._log.space.dim == 2 else 0.5)
-        return heavy * float(self._farthest @ every), self._turn * size
+        turned = self._turn * float(self.time[-1] - self.time[0])
+        heavy = self._errors.shove + float(self._across[axis]) * turned
+        return heavy * float(self._farthest @ every), self._turn * self._second * float(every[self._size].sum())
 
     def forces(self, window: Window) -> Cuts:
         """Of the balance of forces along each world axis that the plane or space has; contact forces are measured."""
@@ -143,7 +143,7 @@ class Balances:
         wrong = 2.0 * self._rate_error if planar else self._rate_error + 2.0 * self._turn * errors.rate
         spreads[:, self._size] = wrong
         turned = self._turn * w.size.sum() + self._between(w)
-        heavy = np.linalg.norm(np.cross(log.gravity, log.axes), axis=1) * turned + errors.shove
+        heavy = self._across * turned + errors.shove
         spreads += heavy[:, None] * self._farthest
         return Cuts(rows, along @ duration, spreads, self._moment_error(w, steps, along))
 
@@ -163,7 +163,7 @@ class Balances:
         slope = np.abs(w.slope)
         noise = turn * (kinks + 2.0 * rate * slope @ w.duration) + turn**2 * slope.sum()
         chords = 0.5 * rate**2 * slope @ w.duration**2
-        return float(noise + chords) * (1.0 if self._log.space.dim == 2 else 0.5)
+        return float(noise + chords) * self._second
 
     def _between(self, w: Weights) -> float:
         """The integral of w times the greatest angle from the nearest measurement [rad s]."""

@@ -54,7 +54,9 @@ class DisturbanceObserver:
     def __call__(self, k: int, measured: States, applied_before: Array | None) -> States:
         """The states as they are, after the estimate has taken in what they say."""
         seen = np.isfinite(measured.values).all(axis=1, keepdims=True)
-        q = np.where(seen, measured.orientation, measured.orientation if self._before is None else self._before)
+        q = np.array(measured.orientation)
+        if self._before is not None:
+            q = np.where(seen, q, self._before)
         momentum = rotated(q, _times(self._inertias, rotated(q * CONJUGATE, measured.angular_velocity)))
         given = applied(applied_before)
         if given is None or self._before is None:
